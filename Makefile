@@ -1,0 +1,66 @@
+# `make` prints the targets. Everything needed is set up on the way: a virtual environment with pinned versions,
+# and Debian's OpenCL driver for processors where no working device is found.
+
+PYTHON ?= python3
+VENV := .venv
+BAKE := $(VENV)/bin/diffract-bake
+OUT ?= out
+
+.DEFAULT_GOAL := help
+.PHONY: help setup opencl bake pipeline bench test lint clean
+
+help:
+	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
+	@echo "make pipeline CONFIG=...     set up, then bake any config (several: CONFIG=\"a.toml b.toml\")"
+	@echo "make bench                   time the paper-sized bake beside plain numpy and the device's peak"
+	@echo "make test                    set up, then run linters and every test"
+	@echo "make lint                    ruff and mypy alone"
+	@echo "make setup                   only the set-up"
+	@echo "make clean                   remove the environment and $(OUT)"
+
+setup: $(VENV)/ready opencl
+
+$(VENV)/ready: pyproject.toml requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "error: Python 3.11 or newer is needed; name one with make PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
+		--constraint requirements.lock --editable '.[readers,dev]'
+	touch $@
+
+# A device counts when a kernel was built and run on it; `doctor` exits with 5 where none does.
+opencl: $(VENV)/ready
+	@$(BAKE) doctor >/dev/null 2>&1 || $(MAKE) --no-print-directory install-opencl
+	@$(BAKE) doctor >/dev/null
+
+.PHONY: install-opencl
+install-opencl:
+	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		echo "no working OpenCL device: installing Debian's pocl-opencl-icd" >&2; \
+		apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq pocl-opencl-icd >/dev/null; \
+	else \
+		echo "no working OpenCL device. Ask an administrator for: apt-get install pocl-opencl-icd" >&2; \
+		echo "or, without root: conda install -c conda-forge pocl ocl-icd-system. Then run make again." >&2; \
+		exit 5; \
+	fi
+
+bake: setup
+	$(BAKE) run configs/elaphe.toml --out $(OUT)
+
+pipeline: setup
+	@test -n "$(CONFIG)" || { echo "error: name a config: make pipeline CONFIG=configs/blazed.toml" >&2; exit 2; }
+	$(BAKE) run $(CONFIG) --out $(OUT)
+
+bench: setup
+	$(BAKE) bench configs/elaphe.toml
+
+lint: $(VENV)/ready
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+test: setup lint
+	$(VENV)/bin/python -m pytest
+
+clean:
+	rm -rf $(VENV) $(OUT) *.egg-info
