@@ -1,0 +1,234 @@
+"""From a scan as read to a surface fit for diffraction: levelled, clipped, without holes, centred.
+
+Statistics are taken from valid samples only, so the order is: level, clip, fill holes, centre. A hole is
+then filled from neighbours that are already free of tilt and dust.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
+
+from pipeline.errors import ScanError
+from pipeline.surface.heightfield import HeightField
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+LEVELS = ("none", "plane", "quadratic", "rows")
+
+
+@dataclass(frozen=True)
+class ConditioningRecord:
+    """What was done to a scan; every value is JSON-able.
+
+    holes: samples without a height, filled by harmonic interpolation; hole_share: of all samples.
+    level: what was subtracted: "none", "plane", "quadratic" or "rows".
+    slope_deg: tilt removed along (x, y) at the patch's centre.
+    curvature_per_um: second derivatives removed, (xx, xy, yy).
+    row_offset_rms_um: rms of the row medians removed, about their mean.
+    removed_rms_um: rms of all that was subtracted, about its mean.
+    clip_percentile: percentiles asked for; clip_um: the heights they are, after levelling, before centring.
+    clipped_low, clipped_high: samples moved to a limit; clipped_share: their share of the valid samples.
+    range_before_um, range_after_um: peak to valley before and after the clip; range_kept: their ratio.
+    centre_um: the mid-range that was subtracted last.
+    """
+
+    holes: int
+    hole_share: float
+    level: str
+    slope_deg: tuple[float, float] = (0.0, 0.0)
+    curvature_per_um: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    row_offset_rms_um: float = 0.0
+    removed_rms_um: float = 0.0
+    clip_percentile: tuple[float, float] | None = None
+    clip_um: tuple[float, float] | None = None
+    clipped_low: int = 0
+    clipped_high: int = 0
+    clipped_share: float = 0.0
+    range_before_um: float = 0.0
+    range_after_um: float = 0.0
+    range_kept: float = 1.0
+    centre_um: float = 0.0
+
+
+def condition(
+    field: HeightField, level: str, clip_percentile: tuple[float, float] | None
+) -> tuple[HeightField, ConditioningRecord]:
+    """The field levelled, clipped, filled and centred at mid-range, and the record of it.
+
+    field: heights in um; samples that are not finite are holes. level: one of LEVELS (see `_level`).
+    clip_percentile: (low, high) percentiles of the valid samples that heights are limited to, against dust.
+    Raises ScanError where no sample is valid; ValueError for an unknown level.
+    """
+    if level not in LEVELS:
+        raise ValueError(f"expected one of {LEVELS}, got {level!r}")
+    valid = np.isfinite(field.heights_um)
+    if not valid.any():
+        raise ScanError(
+            "expected heights, found none: every sample of the scan is a hole; choose another channel"
+        )
+    holes = int(valid.size - np.count_nonzero(valid))
+    record = ConditioningRecord(holes, holes / valid.size, level)
+    heights, record = _level(field, valid, record)
+    heights, record = _clip(heights, valid, clip_percentile, record)
+    if holes:
+        heights = fill_holes(heights, valid, field.pitch_um)
+    centre = 0.5 * (float(heights.max()) + float(heights.min()))
+    return HeightField(heights - centre, field.pitch_um), replace(record, centre_um=centre)
+
+
+# --- levelling ---------------------------------------------------------------------------------------
+
+
+def _level(field: HeightField, valid: Mask, record: ConditioningRecord) -> tuple[Array, ConditioningRecord]:
+    """The heights less what `record.level` names.
+
+    plane, quadratic: the least-squares polynomial of total degree 1, 2 in x and y. rows: the plane first,
+    then each row's own median, the usual cure for steps between scan lines (the fast axis is x).
+    """
+    heights = field.heights_um
+    if record.level == "none":
+        return heights, record
+    background, slopes, curvatures = _polynomial(field, valid, degree=2 if record.level == "quadratic" else 1)
+    offsets = np.zeros(heights.shape[0])
+    if record.level == "rows":
+        offsets = _row_medians(heights - background, valid)
+        background = background + offsets[:, None]
+    record = replace(
+        record,
+        slope_deg=slopes,
+        curvature_per_um=curvatures,
+        row_offset_rms_um=float(np.std(offsets)),
+        removed_rms_um=float(np.std(background[valid])),
+    )
+    return heights - background, record
+
+
+def _polynomial(
+    field: HeightField, valid: Mask, degree: int
+) -> tuple[Array, tuple[float, float], tuple[float, float, float]]:
+    """Least-squares polynomial of the valid samples: its values (um), slopes (deg), curvatures (1/um)."""
+    (x, y), (pitch_x, pitch_y) = field.coordinates_um(), field.pitch_um
+    # on [-1, 1] the powers are of one size and the normal equations well conditioned
+    scale_x, scale_y = max(pitch_x, -x[0]), max(pitch_y, -y[0])
+    # the mean goes first, so that a large offset costs no digits
+    mean = float(np.mean(field.heights_um, where=valid))
+    heights = np.where(valid, field.heights_um - mean, 0.0)
+    c = _fit(x / scale_x, y / scale_y, heights, valid, degree)
+    powers_x, powers_y = _powers(x / scale_x, 2), _powers(y / scale_y, 2)
+    background = mean + powers_y @ c @ powers_x.T
+    slope_x, slope_y = np.degrees(np.arctan([c[0, 1] / scale_x, c[1, 0] / scale_y]))
+    xx, xy, yy = 2 * c[0, 2] / scale_x**2, c[1, 1] / (scale_x * scale_y), 2 * c[2, 0] / scale_y**2
+    return background, (float(slope_x), float(slope_y)), (float(xx), float(xy), float(yy))
+
+
+def _fit(x: Array, y: Array, heights: Array, valid: Mask, degree: int) -> Array:
+    """Coefficients c[q, p] (3, 3) of sum c x^p y^q, p + q <= degree <= 2, nearest to `heights` (0 in holes).
+
+    Sums of monomials over a grid separate into small matrix products: no design matrix of all samples.
+    """
+    powers_x, powers_y = _powers(x, 2 * degree), _powers(y, 2 * degree)
+    moments = powers_y.T @ (valid @ powers_x)
+    right = powers_y.T @ (heights @ powers_x)
+    terms = [(q, p) for q in range(degree + 1) for p in range(degree + 1 - q)]
+    gram = np.array([[moments[q + s, p + r] for s, r in terms] for q, p in terms])
+    # least norm: what a single row, or holes, leave undetermined becomes 0
+    solution = np.linalg.lstsq(gram, np.array([right[term] for term in terms]), rcond=None)[0]
+    coefficients = np.zeros((3, 3))
+    for term, value in zip(terms, solution, strict=True):
+        coefficients[term] = value
+    return coefficients
+
+
+def _powers(x: Array, highest: int) -> Array:
+    """x^0 .. x^highest, (len(x), highest + 1)."""
+    return np.vander(x, highest + 1, increasing=True)
+
+
+def _row_medians(heights: Array, valid: Mask) -> Array:
+    """Median of each row's valid samples, (ny,); 0, the plane's level, for a row that has none."""
+    medians = np.zeros(heights.shape[0])
+    whole = valid.all(axis=1)
+    medians[whole] = np.median(heights[whole], axis=1)
+    for j in np.flatnonzero(~whole & valid.any(axis=1)):
+        medians[j] = np.median(heights[j, valid[j]])
+    return medians
+
+
+# --- clipping ----------------------------------------------------------------------------------------
+
+
+def _clip(
+    heights: Array, valid: Mask, percentile: tuple[float, float] | None, record: ConditioningRecord
+) -> tuple[Array, ConditioningRecord]:
+    """Heights limited to the percentiles of the valid samples."""
+    known = heights[valid]
+    before = float(known.max() - known.min())
+    if percentile is None:
+        return heights, replace(record, range_before_um=before, range_after_um=before)
+    low, high = (float(value) for value in np.percentile(known, percentile))
+    below, above = int(np.count_nonzero(known < low)), int(np.count_nonzero(known > high))
+    record = replace(
+        record,
+        clip_percentile=percentile,
+        clip_um=(low, high),
+        clipped_low=below,
+        clipped_high=above,
+        clipped_share=(below + above) / known.size,
+        range_before_um=before,
+        range_after_um=high - low,
+        range_kept=(high - low) / before if before > 0 else 1.0,
+    )
+    return np.clip(heights, low, high), record
+
+
+# --- holes -------------------------------------------------------------------------------------------
+
+
+def fill_holes(heights_um: Array, valid: Mask, pitch_um: tuple[float, float]) -> Array:
+    """The heights with every invalid sample filled by Laplace's equation, um, shape unchanged.
+
+    Each filled sample is the mean of its four neighbours, weighted by 1/pitch^2 (beyond the patch's edge
+    there are none). A harmonic function has its extremes on the boundary: up to rounding, no filled height
+    lies outside the range of the valid samples around its hole. Valid samples are untouched; one must exist.
+    """
+    hole = ~valid
+    heights = heights_um.ravel()
+    unknown = np.flatnonzero(hole)
+    number = np.full(hole.size, -1)
+    number[unknown] = np.arange(unknown.size)
+    diagonal, known = np.zeros(unknown.size), np.zeros(unknown.size)
+    # an empty first block: isolated holes have no links at all
+    blocks = [sparse.csr_array((unknown.size, unknown.size))]
+    for mine, there, weight in _neighbours(unknown, hole.shape, pitch_um):
+        other = number[there]
+        inner = other >= 0
+        np.add.at(diagonal, mine, weight)
+        np.add.at(known, mine[~inner], weight * heights[there[~inner]])
+        links = (np.full(np.count_nonzero(inner), -weight), (mine[inner], other[inner]))
+        blocks.append(sparse.csr_array(links, shape=(unknown.size, unknown.size)))
+    matrix = sum(blocks[1:], blocks[0]) + sparse.diags_array(diagonal)
+    filled = heights_um.copy()
+    filled.ravel()[unknown] = spsolve(matrix.tocsc(), known)
+    return filled
+
+
+def _neighbours(
+    samples: Index, shape: tuple[int, ...], pitch_um: tuple[float, float]
+) -> Iterator[tuple[Index, Index, float]]:
+    """Links of some samples (flat indices) to the right, left, up and down, where the patch goes on there.
+
+    Yields which of the samples have one, the neighbours' flat indices, and the link's weight.
+    """
+    ny, nx = shape
+    j, i = np.divmod(samples, nx)
+    # only the ratio of weights matters; along the finer axis it is 1
+    finest = min(pitch_um)
+    for dj, di in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        mine = np.flatnonzero((j + dj >= 0) & (j + dj < ny) & (i + di >= 0) & (i + di < nx))
+        yield mine, samples[mine] + dj * nx + di, (finest / pitch_um[0 if di else 1]) ** 2

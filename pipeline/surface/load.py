@@ -1,0 +1,198 @@
+"""A scan file and the config's [surface] become one trusted height field in micrometres."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config import Surface, as_pair
+from pipeline.surface.heightfield import HeightField
+from pipeline.surface.readers import read_scan
+from pipeline.surface.readers.common import check_shape, fault, micrometres
+from pipeline.surface.scan import Scan
+
+# a config key may repeat what the file says, to this relative precision
+_AGREES = 1e-3
+_PITCH_UM = (1e-4, 100.0)
+_RANGE_UM = (1e-6, 100.0)
+_OVERRIDE = "remove the key, or set surface.override_file_units = true"
+
+Source = Literal["file", "config"]
+
+
+@dataclass(frozen=True)
+class ScanRecord:
+    """Where a height field came from; JSON-able, and free of folders of this machine.
+
+    shape: samples (ny, nx). pitch_um: sample distance along (x, y), um. um_per_unit: micrometres per
+    stored unit or image code. The two `*_from` say whose value was used. holes: samples without a height.
+    """
+
+    file: str
+    format: str
+    reader: str
+    channel: str
+    channels: tuple[str, ...]
+    shape: tuple[int, int]
+    pitch_um: tuple[float, float]
+    pitch_from: Source
+    um_per_unit: float
+    unit_from: Source
+    holes: int
+
+
+def load_scan(surface: Surface) -> tuple[HeightField, ScanRecord]:
+    """The heights of surface.path in um, holes as NaN, and the record of how they were read.
+
+    The file's units win over the config's keys. Raises ScanError where the file cannot be read, a unit is
+    missing (naming every key to set) or contradicted, or the values cannot be a height map.
+    """
+    if surface.path is None:
+        raise ValueError("load_scan reads files; this surface is a recipe")
+    path = Path(surface.path)
+    scan = read_scan(path, surface.channel)
+    holes = _check_values(path.name, scan.heights)
+    unit, pitch = _units(path.name, scan, surface)
+    heights = scan.heights * unit[0]
+    _check_pitch(path.name, pitch[0])
+    _check_range(path.name, heights, unit, scan.full_code is not None)
+    field = HeightField(heights, pitch[0])
+    record = ScanRecord(
+        file=path.name,
+        format=scan.format,
+        reader=scan.reader,
+        channel=scan.channel,
+        channels=scan.channels,
+        shape=field.shape,
+        pitch_um=pitch[0],
+        pitch_from=pitch[1],
+        um_per_unit=unit[0],
+        unit_from=unit[1],
+        holes=holes,
+    )
+    return field, record
+
+
+# --- values ------------------------------------------------------------------------------------------
+
+
+def _check_values(file: str, heights: NDArray[np.float64]) -> int:
+    """The number of holes. Raises ScanError for a grid or for values that no height map has."""
+    check_shape(file, heights.shape)
+    infinite = int(np.count_nonzero(np.isinf(heights)))
+    if infinite:
+        raise fault(
+            file, "finite heights", f"{infinite} infinite values", "write holes as NaN, mend the rest"
+        )
+    holes = int(np.count_nonzero(np.isnan(heights)))
+    if holes == heights.size:
+        raise fault(file, "heights", "NaN everywhere", "export it again, or set surface.channel")
+    if 2 * holes > heights.size:
+        found = f"{holes} holes (NaN) in {heights.size} samples"
+        raise fault(file, "holes in no more than half of the scan", found, "crop to the measured part")
+    return holes
+
+
+def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:
+    low, high = _PITCH_UM
+    if not all(low <= p <= high for p in pitch_um):
+        raise fault(
+            file,
+            f"a pitch within {low:g}..{high:g} um",
+            f"{pitch_um[0]:.6g} x {pitch_um[1]:.6g} um",
+            "mislabelled units? set surface.pitch_um (against a file's own, with override_file_units = true)",
+        )
+
+
+def _check_range(
+    file: str, heights_um: NDArray[np.float64], unit: tuple[float, Source], is_image: bool
+) -> None:
+    found = float(np.nanmax(heights_um) - np.nanmin(heights_um))
+    if found == 0.0:
+        raise fault(
+            file,
+            "heights that vary",
+            "one and the same height everywhere",
+            "if a mirror is meant, use surface.recipe = { kind = 'mirror' }",
+        )
+    low, high = _RANGE_UM
+    if not low <= found <= high:
+        key = "surface.height_range_um" if is_image else "surface.height_unit"
+        override = " and surface.override_file_units = true" if unit[1] == "file" else ""
+        raise fault(
+            file,
+            f"a height range within {low:g}..{high:g} um",
+            f"{found:.6g} um, taking 1 stored unit for {unit[0]:.6g} um (from the {unit[1]})",
+            f"mislabelled units? set {key}{override}",
+        )
+
+
+# --- units -------------------------------------------------------------------------------------------
+
+
+def _units(
+    file: str, scan: Scan, surface: Surface
+) -> tuple[tuple[float, Source], tuple[tuple[float, float], Source]]:
+    """(um per stored unit, its source) and (pitch in um, its source); every missing key in one error."""
+    unit = _unit(file, scan, surface)
+    pitch = _pitch(file, scan, surface)
+    if unit is not None and pitch is not None:
+        return unit, pitch
+    missing = []
+    if pitch is None:
+        missing.append("surface.pitch_um (sample distance in um)")
+    if unit is None and scan.full_code is None:
+        missing.append("surface.height_unit ('nm', 'um', ...)")
+    if unit is None and scan.full_code is not None:
+        missing.append(f"surface.height_range_um (height in um of code {scan.full_code:g} above 0)")
+    raise fault(
+        file, "units", f"a file ({scan.format}) that does not state them", f"set {' and '.join(missing)}"
+    )
+
+
+def _unit(file: str, scan: Scan, surface: Surface) -> tuple[float, Source] | None:
+    if scan.full_code is not None:
+        return _unit_of_image(file, scan.full_code, surface)
+    if surface.height_range_um is not None:
+        found = "surface.height_range_um, which is for 8- and 16-bit images"
+        raise fault(file, "heights with a unit", found, "use surface.height_unit instead")
+    told = None if surface.height_unit is None else micrometres(surface.height_unit)
+    if scan.um_per_unit is None:
+        return None if told is None else (told, "config")
+    if told is None or _agree(told, scan.um_per_unit):
+        return scan.um_per_unit, "file"
+    if surface.override_file_units:
+        return told, "config"
+    found = f"heights stored in {scan.um_per_unit:g} um, but surface.height_unit = '{surface.height_unit}'"
+    raise fault(file, "units that agree", f"{found} ({told:g} um)", _OVERRIDE)
+
+
+def _unit_of_image(file: str, full_code: float, surface: Surface) -> tuple[float, Source] | None:
+    if surface.height_unit is not None:
+        found = f"surface.height_unit = '{surface.height_unit}', but an image holds codes 0..{full_code:g}"
+        raise fault(file, "a height range", found, "set surface.height_range_um instead")
+    if surface.height_range_um is None:
+        return None
+    return surface.height_range_um / full_code, "config"
+
+
+def _pitch(file: str, scan: Scan, surface: Surface) -> tuple[tuple[float, float], Source] | None:
+    told = None if surface.pitch_um is None else as_pair(surface.pitch_um)
+    if scan.pitch_um is None:
+        return None if told is None else (told, "config")
+    if told is None or all(_agree(a, b) for a, b in zip(told, scan.pitch_um, strict=True)):
+        return scan.pitch_um, "file"
+    if surface.override_file_units:
+        return told, "config"
+    found = f"{_pair(scan.pitch_um)} um in the file, but surface.pitch_um = {_pair(told)}"
+    raise fault(file, "pitches that agree", found, _OVERRIDE)
+
+
+def _agree(a: float, b: float) -> bool:
+    return abs(a - b) <= _AGREES * abs(b)
+
+
+def _pair(value: tuple[float, float]) -> str:
+    return f"{value[0]:.6g} x {value[1]:.6g}"

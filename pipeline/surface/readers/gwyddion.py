@@ -1,0 +1,90 @@
+"""Gwyddion's .gwy, by gwyfile."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.surface.readers.common import (
+    check_shape,
+    fault,
+    library_version,
+    micrometres,
+    pick_channel,
+    third_party,
+    unique_names,
+)
+from pipeline.surface.scan import Scan
+
+_DATA_KEY = re.compile(r"/(\d+)/data")
+
+
+@dataclass(frozen=True)
+class _Field:
+    """One data field: its name, the field object, and micrometres per unit of its values."""
+
+    name: str
+    data: Any
+    um_per_unit: float | None
+
+
+def read(path: Path, channel: str | None) -> Scan:
+    """One data field, flipped: Gwyddion stores the top row first.
+
+    A field whose units are empty keeps None for them. Masks are the user's marks, of grains as often as
+    of bad data, and make no holes.
+    """
+    with third_party(path.name, "a Gwyddion .gwy file", "gwyfile"):
+        import gwyfile
+
+        fields = _height_fields(gwyfile.load(str(path)))
+        names = unique_names([field.name for field in fields])
+        index = pick_channel(path.name, names, channel)
+        heights = _heights(path, fields[index].data)
+        pitch = _pitch(path, fields[index].data)
+    return Scan(
+        heights,
+        fields[index].um_per_unit,
+        pitch,
+        None,
+        names[index],
+        tuple(names),
+        "Gwyddion .gwy",
+        library_version("gwyfile"),
+    )
+
+
+def _height_fields(container: Any) -> list[_Field]:
+    """Fields in a unit of length or in none at all, in the order of their numbers."""
+    numbers = sorted(int(match[1]) for key in container if (match := _DATA_KEY.fullmatch(key)))
+    fields = []
+    for number in numbers:
+        data = container[f"/{number}/data"]
+        unit = _unit(data, "si_unit_z")
+        if unit == "" or micrometres(unit) is not None:
+            name = str(container.get(f"/{number}/data/title") or f"channel {number}")
+            fields.append(_Field(name, data, micrometres(unit)))
+    return fields
+
+
+def _unit(data: Any, key: str) -> str:
+    unit = data.get(key)
+    return "" if unit is None else str(unit.get("unitstr", ""))
+
+
+def _heights(path: Path, data: Any) -> NDArray[np.float64]:
+    check_shape(path.name, (int(data["yres"]), int(data["xres"])))
+    return np.array(data.data[::-1], dtype=np.float64, order="C")
+
+
+def _pitch(path: Path, data: Any) -> tuple[float, float] | None:
+    unit = _unit(data, "si_unit_xy")
+    if unit == "":
+        return None
+    scale = micrometres(unit)
+    if scale is None:
+        raise fault(path.name, "a field in a unit of length", f"one in {unit!r}", "choose another channel")
+    return float(data.xreal) * scale / int(data["xres"]), float(data.yreal) * scale / int(data["yres"])

@@ -1,0 +1,75 @@
+"""Nanonis .sxm, by nanonispy2."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.surface.readers.common import (
+    check_shape,
+    fault,
+    library_version,
+    micrometres,
+    pick_channel,
+    third_party,
+)
+from pipeline.surface.scan import Scan
+
+_BACKWARD = " backward"
+
+
+def read(path: Path, channel: str | None) -> Scan:
+    """One channel in one direction: "Z" is the forward scan, "Z backward" the way back.
+
+    Lines that were never scanned are NaN in the file, and so holes.
+    """
+    with third_party(path.name, "a Nanonis .sxm file", "nanonispy2"):
+        from nanonispy2.read import Scan as NanonisScan
+
+        with _named_sxm(path) as named:
+            stored = NanonisScan(str(named))
+        units = dict(zip(stored.header["data_info"]["Name"], stored.header["data_info"]["Unit"], strict=True))
+        names = [name + way for name, unit in units.items() if micrometres(unit) for way in ("", _BACKWARD)]
+        name = names[pick_channel(path.name, names, channel)]
+        heights = _heights(path, stored, name)
+        um_per_unit = micrometres(units[name.removesuffix(_BACKWARD)])
+        # the range is in metres, and N pixels wide
+        range_x, range_y = (float(metres) * 1e6 for metres in stored.header["scan_range"])
+        pitch = range_x / heights.shape[1], range_y / heights.shape[0]
+    return Scan(
+        heights, um_per_unit, pitch, None, name, tuple(names), "Nanonis .sxm", library_version("nanonispy2")
+    )
+
+
+@contextmanager
+def _named_sxm(path: Path) -> Iterator[Path]:
+    """The file under a name ending in .sxm, without which nanonispy2 does not look into it."""
+    if path.suffix == ".sxm":
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        named = Path(folder) / "scan.sxm"
+        shutil.copyfile(path, named)
+        yield named
+
+
+def _heights(path: Path, stored: Any, name: str) -> NDArray[np.float64]:
+    """The channel with x to the right and y up; the file holds samples in the order of scanning."""
+    way = "backward" if name.endswith(_BACKWARD) else "forward"
+    lines = np.array(stored.signals[name.removesuffix(_BACKWARD)][way], dtype=np.float64)
+    check_shape(path.name, lines.shape)
+    if way == "backward":
+        # the way back begins at the right
+        lines = lines[:, ::-1]
+    direction = stored.header["scan_dir"]
+    if direction not in ("up", "down"):
+        raise fault(path.name, "SCAN_DIR 'up' or 'down'", repr(direction), "export it again")
+    if direction == "down":
+        # the first line scanned was the top one
+        lines = lines[::-1]
+    return np.ascontiguousarray(lines)

@@ -1,0 +1,106 @@
+"""The sampled patch a recipe asks for: a whole number of periods on a whole number of samples."""
+
+from dataclasses import dataclass
+from math import gcd
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config import RecipeBase, as_pair
+from pipeline.errors import ConfigError
+
+# 8 GiB a field: past this a size or a pitch is in the wrong unit
+_MOST_SAMPLES = 2**30
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a patch.
+
+    size_um: its length; samples: how many share it equally; periods: how many whole periods it holds.
+    """
+
+    size_um: float
+    samples: int
+    periods: int
+
+    @property
+    def pitch_um(self) -> float:
+        """Sample distance, um: size / samples, near the pitch asked for."""
+        return self.size_um / self.samples
+
+    def phase(self) -> NDArray[np.float64]:
+        """Position within the period, [0, 1), at every sample; 0 at the middle sample n // 2.
+
+        Integers first: the division is the only rounding, so equal phases are equal numbers.
+        """
+        turns = (np.arange(self.samples) - self.samples // 2) * self.periods % self.samples
+        return turns / self.samples
+
+    @property
+    def phase_step(self) -> float:
+        """Distance between neighbours among all phases that occur: gcd(periods, samples) / samples."""
+        return gcd(self.periods, self.samples) / self.samples
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Both axes of a patch; arrays on it are (y.samples, x.samples)."""
+
+    x: Axis
+    y: Axis
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Samples as (ny, nx)."""
+        return self.y.samples, self.x.samples
+
+    @property
+    def size_um(self) -> tuple[float, float]:
+        """Extent along (x, y), um."""
+        return self.x.size_um, self.y.size_um
+
+    @property
+    def pitch_um(self) -> tuple[float, float]:
+        """Sample distance along (x, y), um."""
+        return self.x.pitch_um, self.y.pitch_um
+
+
+def lay_out(recipe: RecipeBase, period_x_um: float | None = None, period_y_um: float | None = None) -> Patch:
+    """The patch nearest to the recipe's `size_um` and `pitch_um` that holds whole periods (at least one).
+
+    An axis without a period keeps its size. Raises ConfigError where a period falls below two samples,
+    which no height field can carry, or where the patch would not fit into memory.
+    """
+    sizes, pitches = as_pair(recipe.size_um), as_pair(recipe.pitch_um)
+    axes = [
+        _lay_out_axis(recipe, name, size, pitch, period)
+        for name, size, pitch, period in zip("xy", sizes, pitches, (period_x_um, period_y_um), strict=True)
+    ]
+    samples = axes[0].samples * axes[1].samples
+    if samples > _MOST_SAMPLES:
+        found = f"{axes[0].samples} x {axes[1].samples}"
+        raise refusal(recipe, "pitch_um", f"expected a patch of at most 2^30 samples, got {found}")
+    return Patch(*axes)
+
+
+def _lay_out_axis(recipe: RecipeBase, name: str, size: float, pitch: float, period: float | None) -> Axis:
+    periods = 1 if period is None else max(1, round(size / period))
+    size = size if period is None else periods * period
+    samples = max(1, round(size / pitch))
+    if period is not None and samples < 2 * periods:
+        raise refusal(
+            recipe, "pitch_um", f"expected at most half the {name} period of {period:g} um, got {pitch:g} um"
+        )
+    return Axis(size, samples, periods)
+
+
+def refusal(recipe: RecipeBase, key: str, text: str) -> ConfigError:
+    """The ConfigError for one key of a recipe."""
+    kind = getattr(recipe, "kind", "recipe")
+    return ConfigError(f"recipe {kind}", [(f"surface.recipe.{key}", text)])
+
+
+def generator(seed: int) -> np.random.Generator:
+    """The random numbers of a seed; negative seeds are as good as others."""
+    return np.random.default_rng(seed % 2**64)
