@@ -1,0 +1,1 @@
+"""Closed forms of physical optics and colour, one equation a function."""

@@ -1,0 +1,89 @@
+"""What multiplies |P|^2: Fresnel reflectance, obliquity, shadowing and the normalisation chosen.
+
+The reflected radiance under unit irradiance is `direction_factor * sum_l spectral_factor * |P|^2 * weights`.
+`direction_factor` leaves the spectral integral, `spectral_factor` stays inside. They separate exactly
+unless a metal's reflectance depends on wavelength and angle together; `metal_reflectance` is that exact case.
+"""
+
+from math import pi
+
+import numpy as np
+
+from pipeline.config import Material, Spectrum
+from pipeline.optics import fresnel, geometry
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature, trapezoid
+
+
+def direction_factor(material: Material, quadrature: Quadrature, wi: Array, wr: Array) -> Array:
+    """C cos(ti) (...,) for directions (..., 3).
+
+    relative: C = F^2 G / (F0^2 w^2), [D14] eq. 4. absolute: C = R G / w^2, [D14] eq. 2 with the area of the
+    window carried by `spectral_factor`. Schlick's F is squared as the paper prints it; the other
+    models give the reflectance R = |r|^2 itself. A metal enters by its luminous mean.
+    """
+    cos_half = geometry.cos_half(wi, wr)
+    reflected = _reflectance(material, quadrature, cos_half)
+    if material.normalisation == "relative":
+        reflected = reflected / _reflectance(material, quadrature, np.array(1.0))
+        if material.fresnel == "schlick":
+            reflected = reflected**2
+    elif material.fresnel == "conductor":
+        # the spectral factor carries the metal at normal incidence, so only the ratio is left
+        reflected = reflected / _reflectance(material, quadrature, np.array(1.0))
+    return reflected * geometry_factor(material, wi, wr)
+
+
+def geometry_factor(material: Material, wi: Array, wr: Array) -> Array:
+    """G cos(ti) / w^2 and, where asked for, the V-cavity's shadowing: all that holds for any reflectance."""
+    w = geometry.uvw(wi, wr)[..., 2]
+    factor = geometry.obliquity(wi, wr) * wi[..., 2] / w**2
+    return factor * geometry.v_cavity(wi, wr) if material.shadowing else factor
+
+
+def integrand(material: Material, spectrum: Spectrum, step_nm: float, sigma_um: float) -> Quadrature:
+    """Light, observer and all of the material that varies with wavelength, as one quadrature for |P|^2."""
+    quadrature = trapezoid(spectrum, step_nm)
+    factor = spectral_factor(material, quadrature, sigma_um)
+    return Quadrature(quadrature.lambda_nm, quadrature.weights * factor[:, None])
+
+
+def spectral_factor(material: Material, quadrature: Quadrature, sigma_um: float) -> Array:
+    """What varies with wavelength inside the integral, (L,): 4 pi sigma^2 / l^2 and the metal's colour."""
+    factor = np.ones_like(quadrature.lambda_nm)
+    if material.fresnel == "conductor":
+        factor = metal_reflectance(material, quadrature, np.array(1.0))
+    return factor * window_area(material, quadrature, sigma_um)
+
+
+def window_area(material: Material, quadrature: Quadrature, sigma_um: float) -> Array:
+    """(L,): 4 pi sigma^2 / l^2, 1/sr, for `absolute`, which gives a perfect mirror albedo 1; else 1."""
+    if material.normalisation == "relative":
+        return np.ones_like(quadrature.lambda_nm)
+    return 4.0 * pi * (sigma_um / (1e-3 * quadrature.lambda_nm)) ** 2
+
+
+def metal_reflectance(material: Material, quadrature: Quadrature, cos_half: Array) -> Array:
+    """R_l(half angle) (..., L) of the metal; `relative` divides by its luminous mean at normal incidence."""
+    index = fresnel.metal_index(material.metal, quadrature.lambda_nm)
+    values = fresnel.reflectance(np.asarray(cos_half)[..., None], index)
+    if material.normalisation == "absolute":
+        return values
+    return np.asarray(values / _luminous_mean(fresnel.reflectance(1.0, index), quadrature))
+
+
+def _reflectance(material: Material, quadrature: Quadrature, cos_half: Array) -> Array:
+    """The wavelength-free reflectance model at a half angle."""
+    if material.fresnel == "none":
+        return np.ones_like(cos_half)
+    if material.fresnel == "schlick":
+        return fresnel.schlick(cos_half, material.ior)
+    if material.fresnel == "dielectric":
+        return fresnel.reflectance(cos_half, material.ior)
+    index = fresnel.metal_index(material.metal, quadrature.lambda_nm)
+    return _luminous_mean(fresnel.reflectance(cos_half[..., None], index), quadrature)
+
+
+def _luminous_mean(values: Array, quadrature: Quadrature) -> Array:
+    """Mean over wavelength (..., L) -> (...,) as the eye's Y weighs it under the illuminant."""
+    return np.asarray(values @ quadrature.weights[:, 1])
