@@ -1,0 +1,1 @@
+"""Code that runs on devices: OpenCL sources and their host side."""

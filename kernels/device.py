@@ -1,0 +1,194 @@
+"""OpenCL devices, programs and launches: the only place that imports pyopencl.
+
+A device counts as working only when a kernel was built and run on it: drivers exist that list a device and
+cannot compile for it. Contexts do not survive a fork, so they are made lazily, once per process.
+"""
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import platformdirs
+from filelock import FileLock
+
+DEVICE_VARIABLE = "DIFFRACT_BAKE_DEVICE"
+REMEDY = (
+    "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
+    "`conda install -c conda-forge pocl`; then `diffract-bake doctor` shows what was found"
+)
+
+_PROBE = "__kernel void probe(__global double *x) { x[get_global_id(0)] = 2.0 * get_global_id(0); }"
+
+
+class NoDeviceError(RuntimeError):
+    """No OpenCL device can build and run a double-precision kernel; the message says what was tried."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One listed device and whether it works; `fault` is empty where it does."""
+
+    platform: str
+    device: str
+    driver: str
+    compute_units: int
+    memory_bytes: int
+    fault: str
+    handle: Any
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept between processes."""
+    folder = Path(platformdirs.user_cache_dir("diffract-bake")) / "kernels"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """Holds the kernel cache alone: PoCL's cache fails at random when processes fill it together."""
+    with FileLock(cache_folder() / "lock"):
+        yield
+
+
+@cache
+def _opencl() -> Any:
+    """pyopencl, imported once its compilers' caches have a place."""
+    os.environ.setdefault("POCL_CACHE_DIR", str(cache_folder()))
+    # PoCL has its own cache on disk; pyopencl's second one only adds files
+    os.environ.setdefault("PYOPENCL_NO_CACHE", "1")
+    import pyopencl
+
+    return pyopencl
+
+
+def probe_devices() -> list[Probe]:
+    """Every listed OpenCL device, each tried by building and running a kernel on it."""
+    cl = _opencl()
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error:  # the loader's word for "no driver installed"
+        return []
+    return [_probe(platform, device) for platform in platforms for device in platform.get_devices()]
+
+
+def _probe(platform: Any, device: Any) -> Probe:
+    cl = _opencl()
+    fault = ""
+    try:
+        with _compiling():
+            context = cl.Context([device])
+            queue = cl.CommandQueue(context)
+            out = np.zeros(4)
+            buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, out.nbytes)
+            cl.Program(context, _PROBE).build().probe(queue, (4,), None, buffer)
+            cl.enqueue_copy(queue, out, buffer)
+        if not np.array_equal(out, [0.0, 2.0, 4.0, 6.0]):
+            fault = f"a test kernel gave {out.tolist()} instead of [0, 2, 4, 6]"
+    except cl.Error as error:
+        fault = " ".join(str(error).split())[:200]
+    driver = f"{device.driver_version}, {device.version.strip()}"
+    name = device.name.strip()
+    return Probe(platform.name, name, driver, device.max_compute_units, device.global_mem_size, fault, device)
+
+
+@dataclass(frozen=True)
+class Device:
+    """The device in use, its context and its in-order queue."""
+
+    name: str
+    driver: str
+    compute_units: int
+    context: Any
+    queue: Any
+
+
+@cache
+def default_device() -> Device:
+    """The first working device, or the first whose name holds $DIFFRACT_BAKE_DEVICE.
+
+    Raises NoDeviceError with what was tried and the remedy.
+    """
+    wanted = os.environ.get(DEVICE_VARIABLE, "")
+    probes = probe_devices()
+    for probe in probes:
+        if not probe.fault and wanted.lower() in f"{probe.platform} {probe.device}".lower():
+            context = _opencl().Context([probe.handle])
+            queue = _opencl().CommandQueue(context)
+            return Device(probe.device, probe.driver, probe.compute_units, context, queue)
+    tried = "; ".join(f"{p.device}: {p.fault or 'works, but not asked for'}" for p in probes) or "none is listed"
+    asked = f" named like {wanted!r} (from {DEVICE_VARIABLE})" if wanted else ""
+    raise NoDeviceError(f"no working OpenCL device{asked}: {tried}. To mend it, {REMEDY}")
+
+
+class Program:
+    """OpenCL sources built with constants, their kernels ready to launch on the default device."""
+
+    def __init__(self, sources: Sequence[str], constants: dict[str, int]) -> None:
+        cl = _opencl()
+        self.device = default_device()
+        text = "\n".join(source(name) for name in sources)
+        # signed zeros and infinities never matter here; NaN does (it marks what is unknown)
+        options = ["-cl-mad-enable", *(f"-D{key}={value}" for key, value in sorted(constants.items()))]
+        with _compiling():
+            self._program = cl.Program(self.device.context, text).build(options)
+        self._kernels: dict[str, Any] = {}
+
+    def launch(self, kernel: str, size: tuple[int, ...], *arguments: Any) -> None:
+        """Runs one kernel over `size` work-items and waits, so that buffers may go afterwards."""
+        if kernel not in self._kernels:
+            self._kernels[kernel] = getattr(self._program, kernel)
+            # PoCL finishes compiling at the first launch
+            with _compiling():
+                self._enqueue(kernel, size, arguments)
+            return
+        self._enqueue(kernel, size, arguments)
+
+    def _enqueue(self, kernel: str, size: tuple[int, ...], arguments: tuple[Any, ...]) -> None:
+        self._kernels[kernel](self.device.queue, size, (1,) * len(size), *arguments)
+        self.device.queue.finish()
+
+
+def source(name: str) -> str:
+    """The text of one kernel file."""
+    return files("kernels").joinpath("opencl", name).read_text(encoding="utf-8")
+
+
+def upload(array: np.ndarray) -> Any:
+    """A read-only device buffer with the array's bytes; hold it until the kernel has run."""
+    cl = _opencl()
+    flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+    return cl.Buffer(default_device().context, flags, hostbuf=np.ascontiguousarray(array))
+
+
+def result_buffer(nbytes: int) -> Any:
+    """A device buffer for a kernel's output."""
+    cl = _opencl()
+    return cl.Buffer(default_device().context, cl.mem_flags.WRITE_ONLY, nbytes)
+
+
+def download(buffer: Any, out: np.ndarray) -> np.ndarray:
+    """Fills `out` from a device buffer and returns it."""
+    _opencl().enqueue_copy(default_device().queue, out, buffer)
+    return out
+
+
+def measure_peak(seconds: float = 0.5) -> float:
+    """Double-precision operations a second of this device, by chains of fused multiply-adds."""
+    program = Program(["peak.cl"], {})
+    items, steps = 64 * default_device().compute_units, 20_000
+    buffer = result_buffer(8 * items)
+    program.launch("peak", (items,), np.int32(steps), buffer)
+    best, until = 0.0, time.perf_counter() + seconds
+    while time.perf_counter() < until:
+        started = time.perf_counter()
+        program.launch("peak", (items,), np.int32(steps), buffer)
+        best = max(best, items * steps * 128.0 / (time.perf_counter() - started))
+    return best

@@ -1,0 +1,137 @@
+"""Host side of the diffraction kernels: arrays in, arrays out; layouts as stated in opencl/*.cl."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kernels import device
+
+_LANES = 8  # doubles in one vector of the kernels
+_TILE = 4096  # nodes or directions in one launch: bounds memory and paces progress
+_GRID = np.dtype(
+    [
+        ("dfx", np.float64),
+        ("dfy", np.float64),
+        ("inverse_2_variance", np.float64),
+        ("columns", np.int32),
+        ("row_zero", np.int32),
+        ("column_zero", np.int32),
+        ("padding", np.int32),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class DeviceStack:
+    """A DFT stack on the device, with the program constants that fit it.
+
+    `coefficients` is (rows, columns, 2, terms) as in pipeline.stack; see there for the other values.
+    """
+
+    buffer: Any
+    grid: np.ndarray
+    constants: dict[str, int]
+    half_range_um: float
+    band_per_um: tuple[float, float]
+
+
+def upload_stack(
+    coefficients: np.ndarray,
+    zero: tuple[int, int],
+    spacing_per_um: tuple[float, float],
+    reach: tuple[int, int],
+    sigma_f_per_um: float,
+    half_range_um: float,
+    band_per_um: tuple[float, float],
+) -> DeviceStack:
+    """Pads the terms to whole vectors and copies the stack to the device. `zero` is (row, column) of f = 0."""
+    rows, columns, _, terms = coefficients.shape
+    blocks = -(-terms // _LANES)
+    padded = np.zeros((rows, columns, 2, blocks * _LANES))
+    padded[..., :terms] = coefficients
+    inverse = 0.5 / sigma_f_per_um**2
+    grid = np.array([(*spacing_per_um, inverse, columns, *zero, 0)], dtype=_GRID)
+    constants = {"TERMS": terms, "BLOCKS": blocks, "REACH_X": reach[0], "REACH_Y": reach[1]}
+    return DeviceStack(device.upload(padded), grid, constants, half_range_um, band_per_um)
+
+
+def taylor_table(
+    stack: DeviceStack,
+    uv: np.ndarray,
+    lambda_um: np.ndarray,
+    weights: np.ndarray,
+    progress: Callable[[float], None],
+) -> np.ndarray:
+    """I_p at nodes: `uv` (nodes, 2), `lambda_um` (L,), `weights` (L, 3) -> float64 (nodes, 3, 2 N + 1).
+
+    Every u must be >= 0: the stack holds that half plane and I_p(-u, -v) = (-1)^p I_p(u, v).
+    """
+    powers = 2 * stack.constants["TERMS"] - 1
+    width = 2 * _LANES * stack.constants["BLOCKS"]
+    program = device.Program(["windowed_dft.cl", "taylor_table.cl"], stack.constants)
+    series = _taylor_series(lambda_um, stack.half_range_um, stack.constants)
+    nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, _fourth_column(weights)))
+    out = np.empty((len(uv), 3, powers))
+    tile = np.empty((_TILE, 3, width))
+    result = device.result_buffer(tile.nbytes)
+    for first in range(0, len(uv), _TILE):
+        count = min(_TILE, len(uv) - first)
+        program.launch(
+            "taylor_table",
+            (count,),
+            stack.buffer,
+            stack.grid,
+            nodes,
+            np.int32(first),
+            *spectrum,
+            np.int32(len(lambda_um)),
+            *(np.float64(f) for f in stack.band_per_um),
+            result,
+        )
+        out[first : first + count] = device.download(result, tile)[:count, :, :powers]
+        progress((first + count) / len(uv))
+    return out
+
+
+def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:
+    """|P|^2 (directions, L) from a Chebyshev stack; NaN beyond the scan's band.
+
+    `uvw` (directions, 3), `lambda_um` (L,). One launch: callers choose how many directions they hold at once.
+    """
+    program = device.Program(["windowed_dft.cl", "power_spectrum.cl"], stack.constants)
+    groups = -(-len(lambda_um) // _LANES)
+    padded = np.full(groups * _LANES, lambda_um[-1])
+    padded[: len(lambda_um)] = lambda_um
+    directions, wavelengths = device.upload(_fourth_column(uvw)), device.upload(padded)
+    out = np.empty((len(uvw), groups * _LANES))
+    result = device.result_buffer(out.nbytes)
+    program.launch(
+        "power_spectrum",
+        (len(uvw), groups),
+        stack.buffer,
+        stack.grid,
+        directions,
+        wavelengths,
+        np.float64(stack.half_range_um),
+        *(np.float64(f) for f in stack.band_per_um),
+        result,
+    )
+    return device.download(result, out)[:, : len(lambda_um)]
+
+
+def _taylor_series(lambda_um: np.ndarray, half_range_um: float, constants: dict[str, int]) -> np.ndarray:
+    """(i k H)^n / n! (L, 2, 8 BLOCKS): what multiplies F_n at each wavelength; zero beyond the last term."""
+    phase = 2.0 * np.pi / lambda_um[:, None] * half_range_um
+    n = np.arange(1, constants["TERMS"])
+    factors = np.cumprod(np.concatenate([np.ones((len(lambda_um), 1), complex), 1j * phase / n], axis=1), axis=1)
+    series = np.zeros((len(lambda_um), 2, _LANES * constants["BLOCKS"]))
+    series[:, 0, : constants["TERMS"]] = factors.real
+    series[:, 1, : constants["TERMS"]] = factors.imag
+    return series
+
+
+def _fourth_column(rows: np.ndarray) -> np.ndarray:
+    """Rows of three as OpenCL's 4-vectors."""
+    return np.pad(rows, ((0, 0), (0, 1)))

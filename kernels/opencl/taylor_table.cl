@@ -1,0 +1,65 @@
+/* Tables I_p(u, v) of the spectrally integrated Taylor series: Dhillon et al. 2014, eq. 11 and 12.
+ *
+ *   I_p(u, v) = sum_l weights[l] sum_(n + m = p) F_n(u/l, v/l) . F_m(u/l, v/l) k^p / (n! m!)
+ *
+ * With G_n = (i k H)^n / n! F_n, where F_n transforms (h/H)^n, eq. 12's dot products are those of the 2-vectors G_n.
+ *
+ *   uv       double2[nodes]                         (u, v) of each node, |(u, v)| <= 2
+ *   lambda   double[wavelengths]                    um
+ *   series   double[wavelengths][2][8 * BLOCKS]      (i k H)^n / n!, real and imaginary
+ *   weights  double4[wavelengths]                   X, Y, Z weights of the quadrature, fourth unused
+ *   table    double[nodes][3][16 * BLOCKS]          I_p, dimensionless, p = 0 .. 2 N, then zeros
+ *   fx_max, fy_max                                  the scan's band, 1/um: beyond it nothing is known and nothing added
+ *
+ * TERMS = N + 1 and BLOCKS = ceil(TERMS / 8) are set by the host. One work-item, one node.
+ */
+
+__kernel void taylor_table(__global const double *stack, const Grid grid, __global const double2 *uv,
+                           const int first, __global const double *lambda, __global const double *series,
+                           __global const double4 *weights, const int wavelengths, const double fx_max,
+                           const double fy_max, __global double *table) {
+    const int node = first + get_global_id(0);
+    double8 x[2 * BLOCKS], y[2 * BLOCKS], z[2 * BLOCKS];
+    UNROLL for (int b = 0; b < 2 * BLOCKS; ++b) x[b] = y[b] = z[b] = 0.0;
+
+    for (int l = 0; l < wavelengths; ++l) {
+        const double fx = uv[node].x / lambda[l], fy = uv[node].y / lambda[l];
+        if (fabs(fx) > fx_max || fabs(fy) > fy_max) continue;
+
+        double8 re[BLOCKS], im[BLOCKS];
+        windowed_dft(stack, grid, fx, fy, re, im);
+
+        /* G_n = series_n F_n, with zeros before and after for the convolution below */
+        double g_re[24 * BLOCKS], g_im[24 * BLOCKS];
+        double *const re_n = g_re + 8 * BLOCKS, *const im_n = g_im + 8 * BLOCKS;
+        __global const double *series_re = series + l * 16 * BLOCKS, *series_im = series_re + 8 * BLOCKS;
+        UNROLL for (int b = 0; b < BLOCKS; ++b) {
+            const double8 c_re = vload8(b, series_re), c_im = vload8(b, series_im);
+            vstore8(c_re * re[b] - c_im * im[b], b, re_n);
+            vstore8(c_re * im[b] + c_im * re[b], b, im_n);
+            vstore8((double8)0.0, b, g_re);
+            vstore8((double8)0.0, b, g_im);
+            vstore8((double8)0.0, b, re_n + 8 * BLOCKS);
+            vstore8((double8)0.0, b, im_n + 8 * BLOCKS);
+        }
+
+        /* sum over n + m = p of G_n . G_m, eight p at a time */
+        UNROLL for (int b = 0; b < 2 * BLOCKS; ++b) {
+            double8 product = 0.0;
+            for (int n = max(0, 8 * (b - BLOCKS) + 1); n < min(TERMS, 8 * b + 8); ++n) {
+                product = fma((double8)re_n[n], vload8(0, re_n + 8 * b - n), product);
+                product = fma((double8)im_n[n], vload8(0, im_n + 8 * b - n), product);
+            }
+            x[b] = fma((double8)weights[l].x, product, x[b]);
+            y[b] = fma((double8)weights[l].y, product, y[b]);
+            z[b] = fma((double8)weights[l].z, product, z[b]);
+        }
+    }
+
+    __global double *out = table + (long)get_global_id(0) * 3 * 16 * BLOCKS;
+    for (int b = 0; b < 2 * BLOCKS; ++b) {
+        vstore8(x[b], b, out);
+        vstore8(y[b], b, out + 16 * BLOCKS);
+        vstore8(z[b], b, out + 32 * BLOCKS);
+    }
+}

@@ -1,0 +1,28 @@
+"""From a stack in memory to one on the device, faults told as this project tells them."""
+
+from kernels import device, diffraction
+from pipeline import digest
+from pipeline.errors import DeviceError
+from pipeline.optics.coherence import sigma_f
+from pipeline.stack import Stack
+
+
+def upload(built: Stack) -> diffraction.DeviceStack:
+    """The stack on the default device. Raises DeviceError where none works."""
+    try:
+        return diffraction.upload_stack(
+            built.coefficients,
+            (built.row_zero, built.column_zero),
+            built.spacing_per_um,
+            built.reach,
+            sigma_f(built.sigma_um),
+            built.half_range_um,
+            built.band_per_um,
+        )
+    except device.NoDeviceError as error:
+        raise DeviceError(str(error)) from None
+
+
+def kernel_digest(name: str) -> str:
+    """Digest of a diffraction kernel's source, the windowed DFT that all of them share included."""
+    return digest.of_json([device.source("windowed_dft.cl"), device.source(name)])

@@ -1,0 +1,135 @@
+"""The truth every other way is held against: |P|^2 by direct summation, and its spectral integral at 1 nm.
+
+Two routes to the same number:
+
+- `power_direct` adds up the samples one by one, float64, no series, no table. Slow and obviously right.
+- `Reference` serves maps in bearable time. It expands exp(i k w h) in Chebyshev polynomials (Jacobi-Anger, terms to
+  2e-11 of the mirror), transforms each once, and gathers the window's neighbourhood, cut at the same share, per
+  direction and wavelength on the device, in float64.
+"""
+
+from collections.abc import Iterator
+from math import pi
+
+import numpy as np
+
+from kernels import diffraction
+from pipeline import series, stack
+from pipeline.config import Config, Material, Spectrum
+from pipeline.device_stack import upload
+from pipeline.evaluate import Evaluator
+from pipeline.optics import brdf, geometry
+from pipeline.optics.coherence import folded_window
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm, trapezoid
+from pipeline.progress import Progress, silent
+from pipeline.surface.heightfield import HeightField
+
+STEP_NM = 1.0
+# in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11, at half the time
+_TOLERANCE = 2e-11
+_DIRECTIONS_AT_ONCE = 2048
+
+
+def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: float) -> Array:
+    """|P|^2 (directions,) = |sum g p exp(+2 pi i f.x) / sum g|^2 at one wavelength, `uvw` (directions, 3).
+
+    f = (u, v) / lambda, p = exp(i k w h) on a patch repeating under the window g (DESIGN's conventions; [D14] eq. 1
+    and 8). NaN beyond the scan's band.
+    """
+    lambda_um = 1e-3 * lambda_nm
+    heights = field.centred().heights_um
+    ny, nx = field.shape
+    px, py = field.pitch_um
+    total = np.sum(folded_window(nx, px, sigma_um, 0.0)) * np.sum(folded_window(ny, py, sigma_um, 0.0))
+    power = np.empty(len(uvw))
+    for i, (u, v, w) in enumerate(uvw):
+        phase = 2.0 * pi / lambda_um * w * heights
+        p = np.cos(phase) + 1j * np.sin(phase)
+        along_x = folded_window(nx, px, sigma_um, u / lambda_um)
+        along_y = folded_window(ny, py, sigma_um, v / lambda_um)
+        power[i] = np.abs((along_y @ p @ along_x) / total) ** 2
+    power[~in_band(field, uvw, lambda_um)] = np.nan
+    return power
+
+
+def in_band(field: HeightField, uvw: Array, lambda_um: float) -> np.ndarray:
+    """Whether (u, v) / lambda lies within the scan's band limit along both axes."""
+    fx, fy = field.band_limit_per_um
+    return np.asarray((np.abs(uvw[:, 0]) / lambda_um <= fx) & (np.abs(uvw[:, 1]) / lambda_um <= fy))
+
+
+def xyz_direct(
+    field: HeightField, sigma_um: float, spectrum: Spectrum, material: Material, wi: Array, wr: Array
+) -> Array:
+    """XYZ (directions, 3) under 1 RU by `power_direct` at every nanometre; `wi`, `wr` (directions, 3)."""
+    quadrature = trapezoid(spectrum, STEP_NM)
+    uvw = geometry.uvw(wi, wr)
+    power = np.stack([power_direct(field, sigma_um, uvw, nm) for nm in quadrature.lambda_nm], axis=-1)
+    return integrate(power, quadrature, material, sigma_um, wi, wr)
+
+
+def integrate(
+    power: Array, quadrature: Quadrature, material: Material, sigma_um: float, wi: Array, wr: Array
+) -> Array:
+    """XYZ (directions, 3) = C cos(ti) sum_l |P|^2 weights (DESIGN sec. 1) from |P|^2 (directions, L).
+
+    What lies beyond the scan's band (NaN) is unknown and adds nothing. A metal's reflectance is taken at every
+    wavelength and half angle.
+    """
+    known = np.nan_to_num(power) * brdf.window_area(material, quadrature, sigma_um)
+    if material.fresnel == "conductor":
+        known = known * brdf.metal_reflectance(material, quadrature, geometry.cos_half(wi, wr))
+        return np.asarray(brdf.geometry_factor(material, wi, wr)[:, None] * (known @ quadrature.weights))
+    return np.asarray(brdf.direction_factor(material, quadrature, wi, wr)[:, None] * (known @ quadrature.weights))
+
+
+class Reference:
+    """|P|^2 and XYZ of one height field for any directions, exact to 1e-9 of the mirror."""
+
+    def __init__(
+        self, field: HeightField, sigma_um: float, lambda_min_nm: float, progress: Progress = silent
+    ) -> None:
+        z = series.largest_phase(field.half_range_um, lambda_min_nm)
+        terms = series.chebyshev_order(z, _TOLERANCE) + 1
+        reachable = series.W_MAX / (1e-3 * lambda_min_nm)
+        built = stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
+        self._sigma_um = sigma_um
+        self._stack = upload(built)
+
+    def power(self, uvw: Array, lambda_nm: Array) -> Array:
+        """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
+        return np.asarray(diffraction.power_spectrum(self._stack, uvw, 1e-3 * lambda_nm))
+
+    def xyz(
+        self,
+        spectrum: Spectrum,
+        material: Material,
+        wi: Array,
+        wr: Array,
+        step_nm: float = STEP_NM,
+        progress: Progress = silent,
+    ) -> Array:
+        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        quadrature = trapezoid(spectrum, step_nm)
+        out = np.empty((len(wr), 3))
+        for tile in _tiles(len(wr)):
+            power = self.power(geometry.uvw(wi[tile], wr[tile]), quadrature.lambda_nm)
+            out[tile] = integrate(power, quadrature, material, self._sigma_um, wi[tile], wr[tile])
+            progress("reference", tile.stop / len(wr))
+        return out
+
+
+def reference_evaluator(field: HeightField, config: Config, progress: Progress = silent) -> Evaluator:
+    """XYZ of pairs of directions by the exact reference under a config's light and material."""
+    reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
+
+    def evaluate(wi: Array, wr: Array) -> Array:
+        return reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
+
+    return evaluate
+
+
+def _tiles(count: int) -> Iterator[slice]:
+    for first in range(0, count, _DIRECTIONS_AT_ONCE):
+        yield slice(first, min(first + _DIRECTIONS_AT_ONCE, count))

@@ -1,0 +1,1 @@
+"""Tables a shader can look up, and how they are looked up."""

@@ -1,0 +1,157 @@
+"""The reference: closed forms of flat surfaces, and two independent routes to one number."""
+
+import numpy as np
+import pytest
+
+from pipeline.config import Material, Spectrum
+from pipeline.optics import geometry
+from pipeline.optics.coherence import sigma_f
+from pipeline.reference import Reference, power_direct, xyz_direct
+from pipeline.surface.heightfield import HeightField
+
+LAMBDA_NM = 550.0
+
+
+def rough(ny: int, nx: int, pitch: tuple[float, float], height: float, seed: int = 3) -> HeightField:
+    """White noise: every frequency, no symmetry."""
+    return HeightField(np.random.default_rng(seed).uniform(-height, height, (ny, nx)), pitch)
+
+
+def pairs(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    theta, phi = np.arccos(rng.uniform(0.1, 1.0, (2, count))), rng.uniform(0, 2 * np.pi, (2, count))
+    return geometry.direction(theta[0], phi[0]), geometry.direction(theta[1], phi[1])
+
+
+def test_a_mirror_shows_the_transform_of_its_window() -> None:
+    """|P|^2 = exp(-|f|^2 / sigma_f^2): a Gaussian lobe of width sigma_f, 1 at its peak."""
+    field = HeightField(np.full((160, 160), 7.0), (0.1, 0.1))
+    u = np.linspace(-0.1, 0.1, 21)
+    uvw = np.stack([u, 0.3 * u, np.full_like(u, -1.9)], axis=-1)
+    f2 = (uvw[:, 0] ** 2 + uvw[:, 1] ** 2) / (1e-3 * LAMBDA_NM) ** 2
+    expected = np.exp(-f2 / sigma_f(3.0) ** 2)
+    np.testing.assert_allclose(power_direct(field, 3.0, uvw, LAMBDA_NM), expected, atol=1e-14)
+
+
+def test_a_plane_rising_towards_x_reflects_towards_minus_x() -> None:
+    """Normal incidence on a slope tan(a): the light leaves at 2 a on the other side of the normal."""
+    slope = np.tan(np.radians(2.0))
+    x = (np.arange(400) - 200) * 0.05
+    field = HeightField(np.tile(slope * x, (400, 1)), (0.05, 0.05))
+    angles = np.radians(np.linspace(-8.0, 8.0, 161))
+    wi = np.broadcast_to([0.0, 0.0, 1.0], (161, 3))
+    wr = np.stack([np.sin(angles), np.zeros(161), np.cos(angles)], axis=-1)
+    power = power_direct(field, 2.0, geometry.uvw(wi, wr), LAMBDA_NM)
+    assert np.degrees(angles[np.argmax(power)]) == pytest.approx(-4.0, abs=0.11)
+
+
+def test_direct_sum_is_the_sum_over_samples_and_copies_as_written() -> None:
+    """P = sum g p exp(+2 pi i f.x) / sum g over a patch repeated by hand, one sample after the other."""
+    field, sigma = rough(6, 8, (0.3, 0.25), 0.1), 0.8
+    uvw = np.array([[0.4, -0.7, -1.3], [-0.9, 0.2, -1.1]])
+    copies, k = 5, 2 * np.pi / (1e-3 * LAMBDA_NM)
+    x, y = field.coordinates_um()
+    amplitude, total = np.zeros(2, complex), 0.0
+    for cy in range(-copies, copies + 1):
+        for cx in range(-copies, copies + 1):
+            for j in range(6):
+                for i in range(8):
+                    px, py = x[i] + cx * field.size_um[0], y[j] + cy * field.size_um[1]
+                    g = np.exp(-(px**2 + py**2) / (2 * sigma**2))
+                    total += g
+                    f = uvw[:, :2] / (1e-3 * LAMBDA_NM)
+                    phase = k * uvw[:, 2] * field.heights_um[j, i] + 2 * np.pi * (f[:, 0] * px + f[:, 1] * py)
+                    amplitude += g * np.exp(1j * phase)
+    np.testing.assert_allclose(power_direct(field, sigma, uvw, LAMBDA_NM), np.abs(amplitude / total) ** 2, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("field", "sigma"),
+    [
+        (rough(64, 64, (0.1, 0.1), 0.2), 2.0),
+        (rough(48, 90, (0.13, 0.09), 0.35), 1.5),
+        (rough(65, 33, (0.1, 0.1), 0.05), 6.0),
+        (rough(80, 80, (0.1, 0.1), 2.0), 0.3),
+        (HeightField(np.zeros((32, 32)), (0.1, 0.1)), 1.0),
+    ],
+    ids=["square", "oblong", "odd, window over many copies", "4 um tall, window of three pixels", "flat"],
+)
+def test_fast_route_agrees_with_the_direct_sum(field: HeightField, sigma: float) -> None:
+    """Jacobi-Anger and the gather against the plain sum, to 1e-9 of the mirror, all wavelengths."""
+    reference = Reference(field, sigma, 380.0)
+    wi, wr = pairs(40)
+    uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -2.0], [0.0, 0.0, -1e-3], [-1.2, 0.4, -1e-9]]])
+    for nm in (380.0, 500.0, 780.0):
+        direct = power_direct(field, sigma, uvw, nm)
+        np.testing.assert_allclose(reference.power(uvw, np.array([nm]))[:, 0], direct, atol=1e-9)
+        assert np.nanmax(direct) > 1e-4
+
+
+def test_a_constant_added_to_the_heights_changes_nothing() -> None:
+    field = rough(40, 40, (0.1, 0.1), 0.2)
+    lifted = HeightField(field.heights_um + 123.4, field.pitch_um)
+    wi, wr = pairs(10)
+    before, after = (power_direct(f, 1.5, geometry.uvw(wi, wr), LAMBDA_NM) for f in (field, lifted))
+    np.testing.assert_allclose(after, before, rtol=1e-9)
+
+
+def test_beyond_the_band_nothing_is_claimed() -> None:
+    """A pitch of 0.3 um knows |f| <= 1.67 / um, which 0.55 um light passes at u = 0.917."""
+    field = rough(32, 32, (0.3, 0.3), 0.1)
+    uvw = np.array([[0.90, 0.0, -1.0], [0.93, 0.0, -1.0], [0.0, -0.93, -1.0]])
+    for power in (
+        power_direct(field, 2.0, uvw, LAMBDA_NM),
+        Reference(field, 2.0, 380.0).power(uvw, np.array([550.0])),
+    ):
+        np.testing.assert_array_equal(np.isfinite(np.ravel(power)), [True, False, False])
+
+
+def test_exchanging_light_and_view_changes_nothing_but_the_cosine() -> None:
+    """XYZ / cos(ti) is a BRDF: symmetric in its directions, to rounding."""
+    reference = Reference(rough(64, 64, (0.1, 0.1), 0.15), 2.0, 380.0)
+    wi, wr = pairs(200)
+    for material in (
+        Material(),
+        Material(fresnel="conductor"),
+        Material(fresnel="dielectric", normalisation="absolute"),
+    ):
+        there = reference.xyz(Spectrum(), material, wi, wr, step_nm=20.0) / wi[:, 2:]
+        back = reference.xyz(Spectrum(), material, wr, wi, step_nm=20.0) / wr[:, 2:]
+        np.testing.assert_allclose(there, back, rtol=1e-11)
+
+
+def test_spectral_integral_of_the_fast_route_is_that_of_the_direct_sum() -> None:
+    """The whole chain at 1 nm, both routes, gold."""
+    field, material = rough(24, 24, (0.1, 0.1), 0.1), Material(fresnel="conductor")
+    spectrum = Spectrum(range_nm=(500.0, 560.0))
+    wi, wr = pairs(3)
+    fast = Reference(field, 0.8, 500.0).xyz(spectrum, material, wi, wr)
+    np.testing.assert_allclose(fast, xyz_direct(field, 0.8, spectrum, material, wi, wr), rtol=1e-8)
+
+
+def test_a_mirror_seen_in_its_own_reflection_is_one_ru() -> None:
+    """Y = 1 at normal incidence whatever the material, relative normalisation."""
+    reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
+    straight = np.array([[0.0, 0.0, 1.0]])
+    for fresnel in ("none", "schlick", "dielectric", "conductor"):
+        xyz = reference.xyz(Spectrum(), Material(fresnel=fresnel), straight, straight)
+        assert xyz[0, 1] == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 40.0])
+def test_absolute_normalisation_gives_a_perfect_mirror_albedo_one(theta_deg: float) -> None:
+    """Integral of f cos(tr) over the lobe is 1 +- 1e-3 for a window of 16 um."""
+    sigma = 16.25
+    reference = Reference(HeightField(np.zeros((700, 700)), (0.1, 0.1)), sigma, 500.0)
+    wi = geometry.direction(np.radians(theta_deg), 0.3)
+    # the lobe is a few sigma_f lambda wide in (u, v)
+    axis = np.linspace(-6, 6, 81) * sigma_f(sigma) * 0.5
+    du = axis[1] - axis[0]
+    x, y = np.meshgrid(axis - wi[0], axis - wi[1])
+    wr = np.stack([x.ravel(), y.ravel(), np.sqrt(1 - x.ravel() ** 2 - y.ravel() ** 2)], axis=-1)
+    lit = np.broadcast_to(wi, wr.shape)
+    material = Material(fresnel="none", shadowing=False, normalisation="absolute")
+    spectrum = Spectrum(illuminant="E", range_nm=(499.0, 501.0))
+    brdf = reference.xyz(spectrum, material, lit, wr)[:, 1] / wi[2]
+    # d omega cos(tr) = du dv
+    assert np.sum(brdf) * du * du == pytest.approx(1.0, abs=1e-3)
