@@ -1,0 +1,97 @@
+"""The validation report: what was baked, how it looks, and how far it is from the truth."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from pipeline.config import Config
+from pipeline.report.page import Page
+
+Rows = list[list[str]]
+
+
+def colour_rows(label: str, errors: Sequence[dict[str, float]]) -> Rows:
+    """Rows of a table of CIELAB errors, one an exposure."""
+    return [
+        [
+            label,
+            f"{e['exposure_ru']:g}",
+            *(f"{e[k]:.3f}" for k in ("mean", "percentile_99", "maximum")),
+        ]
+        for e in errors
+    ]
+
+
+def _surface_rows(summary: dict[str, Any]) -> Rows:
+    s = summary["statistics"]
+    periods = ", ".join(f"{p['period_um']:.3f} µm at {p['direction_deg']:.0f}°" for p in s["periods"])
+    return [
+        ["samples (x × y)", f"{s['shape'][1]} × {s['shape'][0]}"],
+        ["size (µm)", f"{s['size_um'][0]:.4g} × {s['size_um'][1]:.4g}"],
+        ["pitch (µm)", f"{s['pitch_um'][0]:.4g} × {s['pitch_um'][1]:.4g}"],
+        ["rms height σ_h (µm)", f"{s['sigma_h_um']:.4f}"],
+        ["height range (µm)", f"{s['range_um']:.4f}"],
+        ["g = (2π σ_h / 500 nm)²", f"{s['g']:.3f}"],
+        ["dominant periods", periods or "none"],
+        ["frequencies known", f"{100 * s['reach_covered']:.1f} %"],
+    ]
+
+
+def _settings_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
+    n = table["resolution"]
+    return [
+        ["Taylor order N", str(stack["order"])],
+        ["tables I_p (p = 0..2N)", f"{table['powers_of_w']} of {n} × {n}, exponent a = {table['power']:g}"],
+        ["wavelengths", str(table["wavelengths"])],
+        ["window reach (coefficients)", "{} × {}".format(*stack["window_reach"])],
+        ["predicted error of |P|²", f"{stack['predicted_error']:.1e}"],
+        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
+        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
+    ]
+
+
+def build(
+    config: Config,
+    summaries: dict[str, dict[str, Any]],
+    results: dict[str, Any],
+    pictures: dict[str, bytes],
+    maps: Sequence[tuple[bytes, str]],
+) -> str:
+    """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
+    page = Page(config.name, "Diffraction BRDF: what was baked and how far it is from the exact sum.")
+    page.warnings(summaries["surface"]["warnings"])
+    page.section("BRDF maps", f"All views of one light each, at {config.render.exposure_ru:g} RU.")
+    page.pictures(maps)
+    page.section("Surface")
+    page.table(["", ""], _surface_rows(summaries["surface"]))
+    page.picture(pictures["surface"], "The height field as baked: levelled and centred, y up.")
+    page.section("Table")
+    page.table(["", ""], _settings_rows(summaries["stack"], summaries["table"]))
+    page.section(
+        "Error against the reference",
+        "The reference integrates every nanometre, without Taylor series, table or interpolation. Colour error is "
+        "CIELAB ΔE*ab of the colours a screen shows at each exposure.",
+    )
+    rows = [
+        row
+        for m in results["maps"]
+        for row in colour_rows(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"])
+    ]
+    rows += colour_rows("random directions", results["random"]["colour"])
+    page.table(["where", "exposure (RU)", "mean", "99th %", "max"], rows)
+    power, reference = results["random"]["power"], results["reference"]
+    page.table(
+        ["relative error of |P|²", "median", "99th %", "max"],
+        [
+            [
+                "table on random directions",
+                *(f"{power[k]:.1e}" for k in ("median", "percentile_99", "maximum")),
+            ],
+            [
+                "reference against sums over samples",
+                *(f"{reference[k]:.1e}" for k in ("median", "percentile_99", "maximum")),
+            ],
+        ],
+    )
+    for name, caption in results["pictures"].items():
+        page.picture(pictures[name], caption)
+    return page.render()

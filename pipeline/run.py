@@ -1,0 +1,151 @@
+"""The order of stages: what a config needs (the plan, a pure function) and doing it."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline import provenance
+from pipeline.config import Config
+from pipeline.progress import Progress, silent
+from pipeline.stages.render import RENDER
+from pipeline.stages.stack import STACK
+from pipeline.stages.stage import Stage
+from pipeline.stages.surface import SURFACE
+from pipeline.stages.table import TABLE
+from pipeline.stages.validate import VALIDATE
+from pipeline.store import Artifact, Store
+
+STAGES = (SURFACE, STACK, TABLE, RENDER, VALIDATE)
+_ON_DEVICE = {"table", "validate"}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage of a plan: its address, whether it stands in the store, and why."""
+
+    stage: Stage
+    key: str
+    cached: bool
+    reason: str
+    cost: str
+
+
+def plan(config: Config, store: Store, until: str = "validate") -> list[Step]:
+    """The steps up to and including stage `until`, each cached or to do, with the reason. Writes nothing."""
+    keys: dict[str, str] = {}
+    steps: list[Step] = []
+    earlier = store.artifacts()
+    for stage in _needed(until):
+        key = stage.key(config, keys)
+        keys[stage.name] = key
+        cached = store.has(stage.name, key)
+        last = _latest(earlier, stage.name, config.name)
+        made = {step.stage.name for step in steps if not step.cached}
+        reason = "nothing it reads has changed" if cached else _reason(stage, config, made, last)
+        steps.append(Step(stage, key, cached, reason, _cost(stage, config, last)))
+    return steps
+
+
+def _needed(until: str) -> list[Stage]:
+    """The stages that `until` needs, in order, itself last."""
+    by_name = {stage.name: stage for stage in STAGES}
+    wanted, queue = {until}, [until]
+    while queue:
+        for name in by_name[queue.pop()].inputs:
+            if name not in wanted:
+                wanted.add(name)
+                queue.append(name)
+    return [stage for stage in STAGES if stage.name in wanted]
+
+
+def execute(
+    config: Config,
+    steps: list[Step],
+    store: Store,
+    progress: Progress = silent,
+    on_step: Callable[[Step, float | None], None] | None = None,
+) -> dict[str, Artifact]:
+    """Makes what a plan says is to do; gives every step's artifact, its record checked but not its files.
+
+    `on_step` hears of each step: the seconds it took, None where it was cached.
+    """
+    keys = {step.stage.name: step.key for step in steps}
+    for step in steps:
+        name, seconds = step.stage.name, None
+        if store.has(name, step.key):
+            store.touch(name, step.key)
+        else:
+            with store.lock(name, step.key):
+                # another run may have made it while we waited
+                if not store.has(name, step.key):
+                    started = time.perf_counter()
+                    inputs = {needed: store.open(needed, keys[needed]) for needed in step.stage.inputs}
+                    _make(config, step, inputs, store, progress)
+                    seconds = time.perf_counter() - started
+        if on_step is not None:
+            on_step(step, seconds)
+    return {name: store.describe(name, key) for name, key in keys.items()}
+
+
+def _make(config: Config, step: Step, inputs: Mapping[str, Artifact], store: Store, progress: Progress) -> None:
+    stage = step.stage
+    record: dict[str, Any] = {
+        "name": config.name,
+        "version": stage.version,
+        "parameters": stage.parameters(config),
+        "inputs": {name: artifact.key for name, artifact in inputs.items()},
+    }
+    with store.create(stage.name, step.key, record) as (folder, whole):
+        started = time.perf_counter()
+        whole["summary"] = stage.produce(config, inputs, folder, progress)
+        whole["provenance"] = {
+            **provenance.versions(),
+            **(provenance.device() if stage.name in _ON_DEVICE else {}),
+            "seconds": round(time.perf_counter() - started, 3),
+        }
+
+
+def _latest(artifacts: list[Artifact], stage: str, name: str) -> Artifact | None:
+    """The artifact of a stage last made or used for a config of this name."""
+    found = [a for a in artifacts if a.stage == stage and a.record.get("name") == name]
+    return max(found, key=lambda a: (a.folder / "artifact.json").stat().st_mtime, default=None)
+
+
+def _reason(stage: Stage, config: Config, made: set[str], last: Artifact | None) -> str:
+    """Why a step is to do: never made, its settings changed, or its inputs will be made."""
+    inputs = sorted(made & set(stage.inputs))
+    if last is None:
+        return "not made before"
+    if last.record["version"] != stage.version:
+        return f"the stage's version is now {stage.version}"
+    changed = _changes(last.record["parameters"], stage.parameters(config))
+    if changed:
+        return f"changed: {', '.join(changed[:3])}" + (f" and {len(changed) - 3} more" if len(changed) > 3 else "")
+    if inputs:
+        return f"its input will be made: {', '.join(inputs)}"
+    return "its input is another one than last time"
+
+
+def _changes(before: Any, now: Any, path: str = "") -> list[str]:
+    """Key paths whose values differ, with both values where they are short."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        keys = sorted(before.keys() | now.keys())
+        return [c for k in keys for c in _changes(before.get(k), now.get(k), f"{path}.{k}" if path else k)]
+    if before == now:
+        return []
+    values = f" {before} -> {now}"
+    return [path + (values if len(values) < 40 else "")]
+
+
+def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
+    """The work in the stage's own units, and how long it took the last time."""
+    texts = {
+        "table": f"{config.table.resolution}² nodes x {config.table.step_nm:g} nm steps",
+        "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
+        "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",
+    }
+    parts = [texts[stage.name]] if stage.name in texts else []
+    if last is not None:
+        parts.append(f"{last.record['provenance']['seconds']:.1f} s last time")
+    return ", ".join(parts) or "unknown before it has run once"

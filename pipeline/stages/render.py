@@ -1,0 +1,56 @@
+"""Render: table -> BRDF maps, one for each light, as EXR and PNG."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import images
+from pipeline.config import Config, Direction
+from pipeline.evaluate import Map, render_map, table_evaluator
+from pipeline.optics import geometry
+from pipeline.optics.colour_error import pixels
+from pipeline.optics.geometry import Array
+from pipeline.progress import Progress
+from pipeline.stages import table
+from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    return {
+        "render": config.render.model_dump(mode="json"),
+        "material": material_parameters(config),
+        "spectrum": spectrum_parameters(config),
+    }
+
+
+def light_direction(light: Direction) -> Array:
+    """The unit vector (3,) towards a light."""
+    return geometry.direction(np.radians(light.theta_deg), np.radians(light.phi_deg))
+
+
+def map_name(light: Direction) -> str:
+    """The stem of a map's files: its light's angles in degrees."""
+    return f"map_theta{light.theta_deg:g}_phi{light.phi_deg:g}"
+
+
+def map_radius(config: Config) -> float:
+    """How far out a map has views: sin(theta_max) of the scene, all without one."""
+    return 1.0 if config.scene is None else float(np.sin(np.radians(config.scene.views.theta_max_deg)))
+
+
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    evaluate = table_evaluator(table.load(inputs["table"]), config)
+    views = Map(config.render.size, map_radius(config))
+    maps = []
+    for i, light in enumerate(config.render.lights):
+        image = render_map(evaluate, light_direction(light), views)
+        stem = map_name(light)
+        images.write_xyz(folder / f"{stem}.exr", image)
+        images.write_png(folder / f"{stem}.png", pixels(image, config.render.exposure_ru))
+        maps.append({**light.model_dump(), "exr": f"{stem}.exr", "png": f"{stem}.png"})
+        progress("maps", (i + 1) / len(config.render.lights))
+    return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}
+
+
+RENDER = Stage("render", 1, ("table",), _parameters, _produce)

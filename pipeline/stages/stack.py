@@ -1,0 +1,88 @@
+"""Stack: height field -> the DFT of every Taylor term, over the frequencies a view can reach."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import arrays, series
+from pipeline import stack as dft_stack
+from pipeline.config import Config
+from pipeline.optics.spectra import trapezoid
+from pipeline.progress import Progress
+from pipeline.stages import surface
+from pipeline.stages.stage import Inputs, Stage, Summary, spectrum_parameters
+from pipeline.store import Artifact
+
+_FILE = "stack.zarr"
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    table = config.table
+    return {
+        "spectrum": spectrum_parameters(config),
+        "sigma_um": config.coherence.sigma_um,
+        "terms": table.terms,
+        "tolerance": table.tolerance,
+        "step_nm": table.step_nm,
+    }
+
+
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    field = surface.load(inputs["surface"])
+    quadrature = trapezoid(config.spectrum, config.table.step_nm)
+    order = None if config.table.terms == "auto" else config.table.terms
+    plan = series.plan_taylor(field, quadrature, config.table.tolerance, order)
+    built = dft_stack.build(
+        field,
+        "taylor",
+        plan.order + 1,
+        config.coherence.sigma_um,
+        series.W_MAX / (1e-3 * quadrature.lambda_min_nm),
+        dft_stack.window_tolerance(config.table.tolerance),
+        progress,
+    )
+    _save(built, folder / _FILE)
+    return {
+        "order": plan.order,
+        "predicted_error": plan.error,
+        "truncation": plan.truncation,
+        "float32_rounding": plan.rounding,
+        "frequencies": list(built.coefficients.shape[:2]),
+        "window_reach": list(built.reach),
+    }
+
+
+def _save(built: dft_stack.Stack, path: Path) -> None:
+    rows, columns = built.coefficients.shape[:2]
+    dfx, dfy = built.spacing_per_um
+    arrays.save(
+        path,
+        {
+            "F": arrays.Named(built.coefficients, ("fy", "fx", "part", "term"), "1"),
+            "fx": arrays.Named((np.arange(columns) - built.column_zero) * dfx, ("fx",), "1/um"),
+            "fy": arrays.Named((np.arange(rows) - built.row_zero) * dfy, ("fy",), "1/um"),
+        },
+        {
+            "basis": built.basis,
+            "row_zero": built.row_zero,
+            "column_zero": built.column_zero,
+            "spacing_per_um": list(built.spacing_per_um),
+            "reach": list(built.reach),
+            "half_range_um": built.half_range_um,
+            "sigma_um": built.sigma_um,
+            "band_per_um": list(built.band_per_um),
+        },
+    )
+
+
+def load(artifact: Artifact) -> dft_stack.Stack:
+    """The stack of a stack artifact."""
+    zarr = artifact.folder / _FILE
+    found = arrays.attributes(zarr)
+    for pair in ("spacing_per_um", "reach", "band_per_um"):
+        found[pair] = tuple(found[pair])
+    return dft_stack.Stack(coefficients=arrays.load(zarr, "F"), **found)
+
+
+STACK = Stage("stack", 1, ("surface",), _parameters, _produce)

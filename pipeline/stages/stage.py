@@ -1,0 +1,66 @@
+"""What every stage is: a pure function from config sections and input artifacts to one artifact."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline import digest
+from pipeline.config import Config
+from pipeline.progress import Progress
+from pipeline.store import Artifact
+
+Inputs = Mapping[str, Artifact]
+Summary = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage.
+
+    version: raised whenever the same parameters would give another artifact.
+    inputs: names of the stages whose artifacts it reads.
+    parameters: everything it reads from the config, as JSON; with the input keys, it addresses the artifact.
+    produce: writes the artifact's files into a folder and returns its summary (JSON).
+    """
+
+    name: str
+    version: int
+    inputs: tuple[str, ...]
+    parameters: Callable[[Config], dict[str, Any]]
+    produce: Callable[[Config, Inputs, Path, Progress], Summary]
+
+    def key(self, config: Config, input_keys: Mapping[str, str]) -> str:
+        """The artifact's address."""
+        return digest.of_json(
+            {
+                "stage": self.name,
+                "version": self.version,
+                "parameters": self.parameters(config),
+                "inputs": {name: input_keys[name] for name in self.inputs},
+            }
+        )
+
+
+def file_or_name(name: str) -> dict[str, str]:
+    """A value that may name a CSV file, by the file's content."""
+    if name.lower().endswith(".csv"):
+        return {"sha256": digest.of_file(Path(name))}
+    return {"name": name}
+
+
+def spectrum_parameters(config: Config) -> dict[str, Any]:
+    """The [spectrum] section, an illuminant's CSV by its content."""
+    section = config.spectrum.model_dump(mode="json")
+    if isinstance(config.spectrum.illuminant, str):
+        section["illuminant"] = file_or_name(config.spectrum.illuminant)
+    return section
+
+
+def material_parameters(config: Config) -> dict[str, Any]:
+    """The [material] section as far as the model chosen reads it, a metal's CSV by its content."""
+    section = config.material.model_dump(mode="json")
+    section["metal"] = file_or_name(config.material.metal) if config.material.fresnel == "conductor" else None
+    if config.material.fresnel in ("none", "conductor"):
+        section["ior"] = None
+    return section
