@@ -1,0 +1,113 @@
+"""What commands share: options, progress on stderr, tables on stdout."""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pipeline.progress import Progress
+
+# a step is worth a line when it lasts longer than people wait without wondering
+_WORTH_TELLING_S = 1.0
+
+
+def store_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    return click.option(
+        "--store",
+        "store_root",
+        type=click.Path(path_type=Path, file_okay=False),
+        envvar="DIFFRACT_BAKE_STORE",
+        show_envvar=True,
+        help="Folder of cached artifacts [default: the user's cache].",
+    )(command)
+
+
+def json_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines.")(command)
+
+
+def out_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    return click.option(
+        "--out",
+        type=click.Path(path_type=Path, file_okay=False),
+        default=Path("out"),
+        show_default=True,
+        help="Folder for results, one subfolder a material.",
+    )(command)
+
+
+def open_store(root: Path | None) -> Any:
+    """The store at `root`, or the user's own."""
+    import platformdirs
+
+    from pipeline.store import Store
+
+    return Store(root or Path(platformdirs.user_cache_dir("diffract-bake")) / "store")
+
+
+def print_json(value: Any) -> None:
+    click.echo(json.dumps(value, indent=1))
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Left-aligned columns; the last one takes what is left and wraps by itself."""
+    widths = [max(len(str(cell)) for cell in column) for column in zip(columns, *rows, strict=True)]
+    for row in (columns, *rows):
+        cells = [str(cell).ljust(width) for cell, width in zip(row, widths, strict=True)]
+        click.echo("  ".join(cells).rstrip())
+
+
+def warn(text: str) -> None:
+    click.echo(f"warning: {text}", err=True)
+
+
+def note(text: str) -> None:
+    click.echo(text, err=True)
+
+
+@contextmanager
+def showing_progress() -> Iterator[Progress]:
+    """A live bar on a terminal; elsewhere a line when a step that lasts begins to."""
+    if sys.stderr.isatty():
+        with _bar() as progress:
+            yield progress
+    else:
+        yield _Lines()
+
+
+class _Lines:
+    """Tells once of each step that takes longer than a second, in plain lines."""
+
+    def __init__(self) -> None:
+        self._started: dict[str, float] = {}
+        self._told: set[str] = set()
+
+    def __call__(self, step: str, done: float) -> None:
+        now = time.monotonic()
+        started = self._started.setdefault(step, now)
+        if step not in self._told and now - started > _WORTH_TELLING_S and done < 1.0:
+            self._told.add(step)
+            note(f"  {step}: {100 * done:.0f} % after {now - started:.0f} s ...")
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("  {task.description:<14}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    with Bars(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def progress(step: str, done: float) -> None:
+            if step not in tasks:
+                tasks[step] = bars.add_task(step, total=1.0)
+            bars.update(tasks[step], completed=done, visible=done < 1.0)
+
+        yield progress

@@ -1,0 +1,34 @@
+"""`doctor`: is there a device, which versions, what to do."""
+
+import click
+
+from cli import console
+
+
+@click.command("doctor")
+@console.json_option
+def doctor_command(as_json: bool) -> None:
+    """Build and run a kernel on every OpenCL device; say what works, and how to mend what does not.
+
+    Exit code 5 where no device works. DIFFRACT_BAKE_DEVICE picks a device by a part of its name.
+    """
+    from kernels import device
+    from pipeline import provenance
+    from pipeline.errors import DeviceError
+
+    probes = device.probe_devices()
+    versions = provenance.versions()
+    if as_json:
+        fields = ("platform", "device", "driver", "compute_units", "memory_bytes", "fault")
+        found = [{name: getattr(probe, name) for name in fields} for probe in probes]
+        console.print_json({"devices": found, "versions": versions})
+    else:
+        rows = [[p.platform, p.device, str(p.compute_units), p.fault or "works"] for p in probes]
+        console.print_table(["platform", "device", "units", "kernel"], rows)
+        click.echo(", ".join(f"{name} {number}" for name, number in versions.items()))
+    try:
+        used = device.default_device()
+    except device.NoDeviceError as error:
+        raise DeviceError(str(error)) from None
+    if not as_json:
+        click.echo(f"in use: {used.name} ({used.driver})")

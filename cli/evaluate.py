@@ -1,0 +1,83 @@
+"""`eval`: radiance for pairs of directions."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cli import console, sources
+
+_COLUMNS = ("theta_i", "phi_i", "theta_r", "phi_r")
+
+
+@click.command("eval")
+@click.argument("source", type=click.Path(path_type=Path, exists=True))
+@click.option(
+    "--directions",
+    type=click.Path(path_type=Path, allow_dash=True),
+    required=True,
+    help="CSV with rows of theta_i,phi_i,theta_r,phi_r in degrees; '-' reads stdin.",
+)
+@click.option("--exact", is_flag=True, help="By the exact reference instead of the table (configs only).")
+@console.store_option
+@console.json_option
+def eval_command(source: Path, directions: Path, exact: bool, store_root: Path | None, as_json: bool) -> None:
+    """Print X,Y,Z under 1 RU for rows of directions, from SOURCE: a bundle's folder or a config.
+
+    Directions point away from the surface; theta is measured from its normal, phi from +x.
+    """
+    rows = _read_directions(directions)
+    wi, wr = _unit_vectors(rows)
+    with console.showing_progress() as progress:
+        xyz = sources.evaluator(source, exact, store_root, progress)(wi, wr)
+    sources.refuse_unreached(xyz, str(directions), str(source))
+    if as_json:
+        console.print_json([dict(zip("XYZ", map(float, row), strict=True)) for row in xyz])
+        return
+    click.echo("X,Y,Z")
+    for row in xyz:
+        click.echo(",".join(f"{value:.12g}" for value in row))
+
+
+def _read_directions(path: Path) -> list[list[float]]:
+    """Rows of four angles in degrees; a header line may lead. Faults name the line."""
+    from pipeline.errors import ScanError
+
+    try:
+        text = sys.stdin.read() if str(path) == "-" else path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScanError(f"{path}: cannot be read as text ({error})") from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.split("#")[0].strip()
+        if not content or (not rows and [c.strip() for c in content.split(",")] == list(_COLUMNS)):
+            continue
+        rows.append(_read_row(content, f"{path}: line {number}"))
+    if not rows:
+        raise ScanError(f"{path}: expected rows of {','.join(_COLUMNS)} in degrees, got none")
+    return rows
+
+
+def _read_row(content: str, place: str) -> list[float]:
+    from pipeline.errors import ScanError
+
+    try:
+        row = [float(cell) for cell in content.split(",")]
+    except ValueError:
+        row = []
+    if len(row) != 4:
+        raise ScanError(f"{place}: expected four numbers {','.join(_COLUMNS)}, got {content!r}")
+    # NaN fails every comparison
+    if not (0 <= row[0] < 90 and 0 <= row[2] < 90 and abs(row[1]) < 1e6 and abs(row[3]) < 1e6):
+        raise ScanError(f"{place}: expected theta in [0, 90) and finite phi, degrees, got {content!r}")
+    return row
+
+
+def _unit_vectors(rows: list[list[float]]) -> tuple[Any, Any]:
+    import numpy as np
+
+    from pipeline.optics.geometry import direction
+
+    angles = np.radians(np.array(rows))
+    return direction(angles[:, 0], angles[:, 1]), direction(angles[:, 2], angles[:, 3])

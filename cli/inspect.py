@@ -1,0 +1,71 @@
+"""`inspect`: what a scan, a config or a bundle holds."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cli import console
+
+
+@click.command("inspect")
+@click.argument("source", type=click.Path(path_type=Path, exists=True))
+@click.option("--channel", help="The channel of a scan file that holds several.")
+@console.json_option
+def inspect_command(source: Path, channel: str | None, as_json: bool) -> None:
+    """Say what SOURCE holds: a scan file, a config or a bundle's folder. Bakes nothing."""
+    if source.is_dir():
+        found = _bundle(source)
+    elif source.suffix == ".toml":
+        found = _config(source)
+    else:
+        found = _scan(source, channel)
+    if as_json:
+        console.print_json(found)
+        return
+    for key, value in found.items():
+        click.echo(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
+
+
+def _bundle(folder: Path) -> dict[str, Any]:
+    from pipeline.errors import DamagedError
+
+    try:
+        manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DamagedError(f"{folder}: not a bundle: manifest.json cannot be read ({error})") from None
+    return manifest
+
+
+def _config(path: Path) -> dict[str, Any]:
+    from pipeline import config as configs
+
+    resolved: dict[str, Any] = configs.load(path).model_dump(mode="json")
+    return resolved
+
+
+def _scan(path: Path, channel: str | None) -> dict[str, Any]:
+    import numpy as np
+
+    from pipeline.surface.readers import read_scan
+
+    scan = read_scan(path, channel)
+    valid = scan.heights[np.isfinite(scan.heights)]
+    found = {k: v for k, v in asdict(scan).items() if k != "heights"}
+    rows, columns = scan.heights.shape
+    needs = {
+        "surface.pitch_um": scan.pitch_um is None,
+        "surface.height_range_um": scan.um_per_unit is None and scan.full_code is not None,
+        "surface.height_unit": scan.um_per_unit is None and scan.full_code is None,
+    }
+    return {
+        "file": path.name,
+        **found,
+        "samples": f"{columns} x {rows}",
+        "holes": int(scan.heights.size - valid.size),
+        "lowest": float(valid.min()) if valid.size else None,
+        "highest": float(valid.max()) if valid.size else None,
+        "config needs": [key for key, needed in needs.items() if needed],
+    }

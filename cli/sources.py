@@ -1,0 +1,54 @@
+"""Where commands take radiance from: a config's table, its exact reference, or a bundle."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cli import console
+
+
+def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
+    """XYZ of pairs of directions from SOURCE, a bundle's folder or a config."""
+    if source.is_dir():
+        if exact:
+            raise click.UsageError("--exact needs a config: a bundle holds tables, not the surface")
+        from pipeline.bundle.open import bundle_evaluator
+
+        return bundle_evaluator(source)
+    from pipeline import config as configs
+
+    return config_evaluator(configs.load(source), exact, store_root, progress)
+
+
+def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
+    """XYZ of pairs of directions from a config, baking what is missing."""
+    from pipeline import run
+
+    store = console.open_store(store_root)
+    until = "surface" if exact else "table"
+    artifacts = run.execute(config, run.plan(config, store, until), store, progress)
+    artifact = store.open(until, artifacts[until].key)
+    if exact:
+        from pipeline.reference import reference_evaluator
+        from pipeline.stages import surface
+
+        return reference_evaluator(surface.load(artifact), config, progress)
+    from pipeline.evaluate import table_evaluator
+    from pipeline.stages import table
+
+    return table_evaluator(table.load(artifact), config, progress)
+
+
+def refuse_unreached(xyz: Any, what: str, source: str) -> None:
+    """Tables made for a scene do not know the rest: NaN becomes a message."""
+    import numpy as np
+
+    from pipeline.errors import ScanError
+
+    unreached = int(np.sum(~np.isfinite(xyz).all(axis=-1)))
+    if unreached:
+        raise ScanError(
+            f"{source}: {unreached} of the directions of {what} are outside the [scene] that it was baked for; leave "
+            "[scene] out to bake all directions"
+        )
