@@ -1,6 +1,7 @@
 """`run`, `validate` and `plan`: what a config needs, and doing it."""
 
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,11 @@ def publish_bundle(config: Config, store: Any, artifacts: dict[str, Any], folder
     if standing is not None:
         console.note("  bundle    cached")
         return standing
+    started = time.perf_counter()
     opened = {name: store.open(name, artifact.key) for name, artifact in artifacts.items()}
-    return publish(config, opened, folder, progress)
+    bundle = publish(config, opened, folder, progress)
+    console.note(f"  bundle    {time.perf_counter() - started:.1f} s")
+    return bundle
 
 
 def _tell(result: dict[str, Any]) -> None:

@@ -128,6 +128,16 @@ def default_device() -> Device:
     raise NoDeviceError(f"no working OpenCL device{asked}: {tried}. To mend it, {REMEDY}")
 
 
+def program(sources: tuple[str, ...], constants: dict[str, int]) -> "Program":
+    """The built program of these sources and constants, one for the whole process."""
+    return _programs(sources, tuple(sorted(constants.items())))
+
+
+@cache
+def _programs(sources: tuple[str, ...], constants: tuple[tuple[str, int], ...]) -> "Program":
+    return Program(sources, dict(constants))
+
+
 class Program:
     """OpenCL sources built with constants, their kernels ready to launch on the default device."""
 
@@ -182,13 +192,13 @@ def download(buffer: Any, out: np.ndarray) -> np.ndarray:
 
 def measure_peak(seconds: float = 0.5) -> float:
     """Double-precision operations a second of this device, by chains of fused multiply-adds."""
-    program = Program(["peak.cl"], {})
+    peak = program(("peak.cl",), {})
     items, steps = 64 * default_device().compute_units, 20_000
     buffer = result_buffer(8 * items)
-    program.launch("peak", (items,), np.int32(steps), buffer)
+    peak.launch("peak", (items,), np.int32(steps), buffer)
     best, until = 0.0, time.perf_counter() + seconds
     while time.perf_counter() < until:
         started = time.perf_counter()
-        program.launch("peak", (items,), np.int32(steps), buffer)
+        peak.launch("peak", (items,), np.int32(steps), buffer)
         best = max(best, items * steps * 128.0 / (time.perf_counter() - started))
     return best

@@ -31,6 +31,7 @@ class DeviceStack:
     """
 
     buffer: Any
+    decay: Any
     grid: np.ndarray
     constants: dict[str, int]
     half_range_um: float
@@ -54,7 +55,11 @@ def upload_stack(
     inverse = 0.5 / sigma_f_per_um**2
     grid = np.array([(*spacing_per_um, inverse, columns, *zero, 0)], dtype=_GRID)
     constants = {"TERMS": terms, "BLOCKS": blocks, "REACH_X": reach[0], "REACH_Y": reach[1]}
-    return DeviceStack(device.upload(padded), grid, constants, half_range_um, band_per_um)
+    offsets = [np.arange(-r, r + 1) * d for r, d in zip(reach, spacing_per_um, strict=True)]
+    decay = np.exp(-(np.concatenate(offsets) ** 2) * inverse)
+    return DeviceStack(
+        device.upload(padded), device.upload(decay), grid, constants, half_range_um, band_per_um
+    )
 
 
 def taylor_table(
@@ -70,7 +75,7 @@ def taylor_table(
     """
     powers = 2 * stack.constants["TERMS"] - 1
     width = 2 * _LANES * stack.constants["BLOCKS"]
-    program = device.Program(["windowed_dft.cl", "taylor_table.cl"], stack.constants)
+    program = device.program(("windowed_dft.cl", "taylor_table.cl"), stack.constants)
     series = _taylor_series(lambda_um, stack.half_range_um, stack.constants)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, _fourth_column(weights)))
     out = np.empty((len(uv), 3, powers))
@@ -82,6 +87,7 @@ def taylor_table(
             "taylor_table",
             (count,),
             stack.buffer,
+            stack.decay,
             stack.grid,
             nodes,
             np.int32(first),
@@ -100,7 +106,7 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
 
     `uvw` (directions, 3), `lambda_um` (L,). One launch: callers choose how many directions they hold at once.
     """
-    program = device.Program(["windowed_dft.cl", "power_spectrum.cl"], stack.constants)
+    program = device.program(("windowed_dft.cl", "power_spectrum.cl"), stack.constants)
     groups = -(-len(lambda_um) // _LANES)
     padded = np.full(groups * _LANES, lambda_um[-1])
     padded[: len(lambda_um)] = lambda_um
@@ -111,6 +117,7 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
         "power_spectrum",
         (len(uvw), groups),
         stack.buffer,
+        stack.decay,
         stack.grid,
         directions,
         wavelengths,

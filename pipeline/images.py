@@ -1,6 +1,8 @@
 """Pictures on disk: EXR for numbers, PNG for eyes."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +19,26 @@ def write_xyz(path: Path, image: Array) -> None:
 
     Raises StorageError.
     """
+    write_exr(path, {f"brdf.{name}": image[..., c].astype(np.float32) for c, name in enumerate("XYZ")}, _XYZ_SPACE)
+
+
+def write_exr(path: Path, channels: Mapping[str, NDArray[Any]], colour_space: str) -> None:
+    """Planes (rows, columns) in float32 or float16 by channel name, first row on top. Raises StorageError.
+
+    ZIP: 51 tables of 501 x 501 floats take 2 s and 70 % of their raw size (none 0.7 s, 100 %; PIZ 7 s, 76 %).
+    A second thread wins only 5 %. ZSTD takes 55 %, but readers before OpenEXR 3.5 do not know it.
+    """
     import OpenEXR
 
-    channels = {f"brdf.{name}": np.ascontiguousarray(image[..., c], np.float32) for c, name in enumerate("XYZ")}
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        "colorInteropID": _XYZ_SPACE,
+        "colorInteropID": colour_space,
     }
+    # OpenEXR.File replaces arrays in the dict it is given: this one is its own
+    planes = {name: np.ascontiguousarray(plane) for name, plane in channels.items()}
     try:
-        OpenEXR.File(header, channels).write(str(path))
+        OpenEXR.File(header, planes).write(str(path))
     except RuntimeError as error:
         raise StorageError(f"{path}: cannot be written ({error}); is the disk full?") from None
 

@@ -55,9 +55,9 @@ def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, or
     Raises AccuracyError where no order, or not this one, reaches the tolerance in float32 tables.
     """
     z = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
-    # a fifth of the budget for the truncation, which enters twice: one or two terms more, where the rounding is
+    # two fifths of the budget for the truncation, which enters twice; the rounding is
     # what it is
-    chosen = order if order is not None else _taylor_order(z, 0.1 * tolerance)
+    chosen = order if order is not None else _taylor_order(z, 0.2 * tolerance)
     plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
     if plan.error > tolerance:
         raise AccuracyError(_refusal(plan, field, tolerance))
@@ -88,7 +88,8 @@ def _taylor_order(z: float, tolerance: float) -> int:
 def _taylor_remainder(z: float, order: int) -> float:
     """Bound on |exp(i z t) - sum_(n <= N) (i z t)^n / n!| for |t| <= 1: z^(N+1) / (N+1)!, Lagrange."""
     n = np.arange(1, order + 2)
-    return float(np.exp(np.sum(np.log(max(z, 1e-300) / n))))
+    # capped: e^700 is hopeless enough, and float64 holds it
+    return exp(min(float(np.sum(np.log(max(z, 1e-300) / n))), 700.0))
 
 
 def float32_rounding(field: HeightField, quadrature: Quadrature) -> float:
@@ -119,11 +120,16 @@ def _term_factors(z: Array, z_max: float) -> Array:
     return np.cumprod(np.concatenate([np.ones((len(z), 1)), z[:, None] / n], axis=1), axis=1)
 
 
+def _channel_shares(quadrature: Quadrature) -> Array:
+    """Each wavelength's share of its channel (L, 3); 0 where a channel sees nothing, as Z of a red laser."""
+    return np.asarray(quadrature.weights / np.maximum(np.abs(quadrature.weights).sum(axis=0), 1e-300))
+
+
 def _diffuse_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature) -> float:
     """A^2, A = sum_n z^n / n! sqrt(mean t^2n): by Parseval a term has this rms where P has 1."""
     factors = _term_factors(z_max * quadrature.lambda_min_nm / quadrature.lambda_nm, z_max)
     root_mean_powers = np.sqrt(t ** (2 * np.arange(factors.shape[1])[:, None]) @ share)
-    weights = np.abs(quadrature.weights) / np.abs(quadrature.weights).sum(axis=0)
+    weights = np.abs(_channel_shares(quadrature))
     return float(np.max(weights.T @ (factors @ root_mean_powers) ** 2))
 
 
@@ -137,7 +143,7 @@ def _specular_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature)
     n = np.arange(factors.shape[1])
     terms = factors * 1j**n * (t ** n[:, None] @ share)
     products = np.array([np.convolve(g.real, g.real) + np.convolve(g.imag, g.imag) for g in terms])
-    i_p = (quadrature.weights / np.abs(quadrature.weights).sum(axis=0)).T @ products
+    i_p = _channel_shares(quadrature).T @ products
     w = np.linspace(W_MAX / 32, W_MAX, 32)[:, None]
     powers = i_p[:, None, :] * (-w) ** np.arange(i_p.shape[1])
     rounded = _ROUNDING_RMS * np.sqrt(np.sum(powers**2, axis=-1))

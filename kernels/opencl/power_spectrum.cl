@@ -32,13 +32,26 @@ static void bessel(double8 z, double8 *j) {
     for (int n = 0; n < TERMS; ++n) j[n] /= norm;
 }
 
-__kernel void power_spectrum(__global const double *stack, const Grid grid, __global const double4 *uvw,
-                             __global const double *lambda, const double half_range, const double fx_max,
+static double total(const double8 x) {
+    const double4 half_sum = x.lo + x.hi;
+    return (half_sum.x + half_sum.y) + (half_sum.z + half_sum.w);
+}
+
+__kernel void power_spectrum(__global const double *stack, __global const double *decay, const Grid grid,
+                             __global const double4 *uvw, __global const double *lambda, const double half_range, const double fx_max,
                              const double fy_max, __global double *power) {
     const int direction = get_global_id(0), group = get_global_id(1);
     const double8 lambdas = vload8(group, lambda);
     double8 bessel_n[TERMS];
     bessel(2.0 * M_PI / lambdas * fabs(uvw[direction].z) * half_range, bessel_n);
+
+    /* (2 - [n = 0]) J_n(s H) by lane, terms side by side; w < 0 makes s negative, and J_n(-z) = (-1)^n J_n(z) */
+    double factors[8][8 * BLOCKS];
+    for (int n = 0; n < 8 * BLOCKS; ++n)
+        for (int lane = 0; lane < 8; ++lane)
+            factors[lane][n] = n < TERMS ? (n == 0 ? 1.0 : (n & 1) ? -2.0 : 2.0) * ((double *)&bessel_n[n])[lane] : 0.0;
+    /* i^n = cosine + i sine */
+    const double8 cosine = (double8)(1, 0, -1, 0, 1, 0, -1, 0), sine = (double8)(0, 1, 0, -1, 0, 1, 0, -1);
 
     for (int lane = 0; lane < 8; ++lane) {
         const int l = 8 * group + lane;
@@ -51,22 +64,15 @@ __kernel void power_spectrum(__global const double *stack, const Grid grid, __gl
             continue;
         }
         double8 re[BLOCKS], im[BLOCKS];
-        windowed_dft(stack, grid, fx, fy, re, im);
+        windowed_dft(stack, decay, grid, fx, fy, re, im);
 
-        double f_re[8 * BLOCKS], f_im[8 * BLOCKS];
+        double8 sum_re = 0.0, sum_im = 0.0;
         UNROLL for (int b = 0; b < BLOCKS; ++b) {
-            vstore8(re[b], b, f_re);
-            vstore8(im[b], b, f_im);
+            const double8 factor = vload8(b, factors[lane]), conjugated = turn * im[b];
+            sum_re = fma(factor, cosine * re[b] - sine * conjugated, sum_re);
+            sum_im = fma(factor, cosine * conjugated + sine * re[b], sum_im);
         }
-        /* w < 0 makes s negative: J_n(-z) = (-1)^n J_n(z), so odd terms change sign */
-        double p_re = 0.0, p_im = 0.0;
-        for (int n = 0; n < TERMS; ++n) {
-            const double odd = (n & 1) ? -1.0 : 1.0;
-            const double a = (n == 0 ? 1.0 : 2.0) * odd * ((const double *)&bessel_n[n])[lane];
-            const double x = a * f_re[n], y = turn * a * f_im[n];
-            p_re += (n & 2) ? ((n & 1) ? y : -x) : ((n & 1) ? -y : x);
-            p_im += (n & 2) ? ((n & 1) ? -x : -y) : ((n & 1) ? x : y);
-        }
+        const double p_re = total(sum_re), p_im = total(sum_im);
         *out = p_re * p_re + p_im * p_im;
     }
 }

@@ -14,8 +14,8 @@
  * TERMS = N + 1 and BLOCKS = ceil(TERMS / 8) are set by the host. One work-item, one node.
  */
 
-__kernel void taylor_table(__global const double *stack, const Grid grid, __global const double2 *uv,
-                           const int first, __global const double *lambda, __global const double *series,
+__kernel void taylor_table(__global const double *stack, __global const double *decay, const Grid grid,
+                           __global const double2 *uv, const int first, __global const double *lambda, __global const double *series,
                            __global const double4 *weights, const int wavelengths, const double fx_max,
                            const double fy_max, __global double *table) {
     const int node = first + get_global_id(0);
@@ -27,7 +27,7 @@ __kernel void taylor_table(__global const double *stack, const Grid grid, __glob
         if (fabs(fx) > fx_max || fabs(fy) > fy_max) continue;
 
         double8 re[BLOCKS], im[BLOCKS];
-        windowed_dft(stack, grid, fx, fy, re, im);
+        windowed_dft(stack, decay, grid, fx, fy, re, im);
 
         /* G_n = series_n F_n, with zeros before and after for the convolution below */
         double g_re[24 * BLOCKS], g_im[24 * BLOCKS];

@@ -9,6 +9,8 @@
  *     row    psi = (row - row_zero) * dfy         column  phi = (column - column_zero) * dfx     1/um
  *     part   0 real, 1 imaginary                  n       term, zero beyond the last
  *
+ *   decay[2 * REACH_X + 1], then [2 * REACH_Y + 1]   double: the window at j spacings from its peak
+ *
  * Set by the host: BLOCKS, vectors of 8 terms; REACH_X and REACH_Y, coefficients taken on either side of the nearest.
  */
 
@@ -25,35 +27,44 @@ typedef struct {
     int columns, row_zero, column_zero;
 } Grid;
 
-#define WEIGHTS(REACH) (8 * ((2 * (REACH) + 8) / 8))
+#define TAPS(REACH) (2 * (REACH) + 1)
 
-/* exp(-(f - s df)^2 / (2 sigma_f^2)) for the 2 reach + 1 coefficients s about the nearest: the window is separable. */
-static void window_weights(const double f, const double df, const double inverse_2_variance, const int first,
-                           const int vectors, double *weight) {
-    const double8 lane = (double8)(0, 1, 2, 3, 4, 5, 6, 7);
-    for (int i = 0; i < vectors; ++i) {
-        const double8 d = f - (lane + (double)(first + 8 * i)) * df;
-        vstore8(exp(-d * d * inverse_2_variance), i, weight);
+/* exp(-(d - j df)^2 / (2 sigma_f^2)), j = -reach .. reach, from e = exp(-d^2 / (2 sigma_f^2)), ratio = exp(d df / sigma_f^2)
+ * and decay_j = exp(-(j df)^2 / (2 sigma_f^2)): one exponential for all coefficients of an axis. */
+static void window_weights(const double e, const double ratio, __global const double *decay, const int reach,
+                           double *weight) {
+    double up = e, down = e;
+    const double inverse = 1.0 / ratio;
+    weight[reach] = e;
+    for (int j = 1; j <= reach; ++j) {
+        up *= ratio;
+        down *= inverse;
+        weight[reach + j] = up * decay[reach + j];
+        weight[reach - j] = down * decay[reach - j];
     }
 }
 
 /* F_n(fx, fy) for all terms, into re and im (BLOCKS vectors each). (fx, fy) must lie within the stack. */
-static void windowed_dft(__global const double *stack, const Grid grid, const double fx, const double fy,
-                         double8 *re, double8 *im) {
-    UNROLL for (int b = 0; b < BLOCKS; ++b) {
+static void windowed_dft(__global const double *stack, __global const double *decay, const Grid grid,
+                         const double fx, const double fy, double8 *re, double8 *im) {
+    for (int b = 0; b < BLOCKS; ++b) {
         re[b] = 0.0;
         im[b] = 0.0;
     }
-    const int first_x = (int)rint(fx / grid.dfx) - REACH_X, first_y = (int)rint(fy / grid.dfy) - REACH_Y;
-    double along_x[WEIGHTS(REACH_X)], along_y[WEIGHTS(REACH_Y)];
-    window_weights(fx, grid.dfx, grid.inverse_2_variance, first_x, WEIGHTS(REACH_X) / 8, along_x);
-    window_weights(fy, grid.dfy, grid.inverse_2_variance, first_y, WEIGHTS(REACH_Y) / 8, along_y);
+    const int nearest_x = (int)rint(fx / grid.dfx), nearest_y = (int)rint(fy / grid.dfy);
+    const double dx = fx - nearest_x * grid.dfx, dy = fy - nearest_y * grid.dfy;
+    const double4 factors = exp((double4)(-dx * dx, 2.0 * dx * grid.dfx, -dy * dy, 2.0 * dy * grid.dfy) *
+                                grid.inverse_2_variance);
+    double along_x[TAPS(REACH_X)], along_y[TAPS(REACH_Y)];
+    window_weights(factors.x, factors.y, decay, REACH_X, along_x);
+    window_weights(factors.z, factors.w, decay + TAPS(REACH_X), REACH_Y, along_y);
 
-    for (int t = 0; t <= 2 * REACH_Y; ++t) {
-        const long row = (long)(first_y + t + grid.row_zero) * grid.columns + first_x + grid.column_zero;
-        for (int s = 0; s <= 2 * REACH_X; ++s) {
+    for (int t = 0; t < TAPS(REACH_Y); ++t) {
+        const long row = (long)(nearest_y - REACH_Y + t + grid.row_zero) * grid.columns;
+        const long first = row + nearest_x - REACH_X + grid.column_zero;
+        for (int s = 0; s < TAPS(REACH_X); ++s) {
             const double8 weight = along_x[s] * along_y[t];
-            __global const double *cell = stack + (row + s) * 16 * BLOCKS;
+            __global const double *cell = stack + (first + s) * 16 * BLOCKS;
             UNROLL for (int b = 0; b < BLOCKS; ++b) {
                 re[b] = fma(weight, vload8(b, cell), re[b]);
                 im[b] = fma(weight, vload8(BLOCKS + b, cell), im[b]);

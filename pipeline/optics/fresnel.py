@@ -34,9 +34,7 @@ def metal_index(metal: str, lambda_nm: Array) -> NDArray[np.complex128]:
 
     Raises ScanError for a CSV that is not three ascending columns covering the wavelengths.
     """
-    source = (
-        files("pipeline.optics").joinpath("gold_johnson_christy_1972.csv") if metal == "Au" else Path(metal)
-    )
+    source = files("pipeline.optics").joinpath("gold_johnson_christy_1972.csv") if metal == "Au" else Path(metal)
     table = read_columns(source.read_bytes(), 3, metal)
     low, high = table[0, 0], table[-1, 0]
     if lambda_nm.min() < low or lambda_nm.max() > high:
@@ -65,9 +63,7 @@ def read_columns(data: bytes, columns: int, name: str) -> Array:
             row = [float(cell) for cell in content.replace(";", ",").split(",")]
         except ValueError:
             if rows or header:
-                raise ScanError(
-                    f"{name}: line {number}: expected {columns} numbers, got {content!r}"
-                ) from None
+                raise ScanError(f"{name}: line {number}: expected {columns} numbers, got {content!r}") from None
             header = True
             continue
         if len(row) != columns or not np.all(np.isfinite(row)):

@@ -1,0 +1,1 @@
+"""Bundles: tables published as a folder that stands alone, can be checked and says how it was made."""

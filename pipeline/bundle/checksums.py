@@ -1,0 +1,49 @@
+"""SHA256SUMS: what `sha256sum -c` reads, and what a bundle's digest is taken over.
+
+The digest is the SHA-256 of SHA256SUMS itself, so `sha256sum SHA256SUMS` shows how the folder's name ends.
+"""
+
+import hashlib
+import re
+from pathlib import Path, PurePosixPath
+
+from pipeline import digest
+
+SUMS = "SHA256SUMS"
+_SHOWN = 12
+_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+
+
+def write(folder: Path) -> str:
+    """Writes SHA256SUMS over all files of a folder, sorted by name; returns its digest, 12 digits."""
+    files = digest.of_folder(folder)
+    lines = [f"{files[name]['sha256']}  {name}\n" for name in sorted(files)]
+    (folder / SUMS).write_text("".join(lines), encoding="utf-8", newline="\n")
+    return of_sums(folder)
+
+
+def of_sums(folder: Path) -> str:
+    """The first 12 digits of the SHA-256 of SHA256SUMS."""
+    return hashlib.sha256((folder / SUMS).read_bytes()).hexdigest()[:_SHOWN]
+
+
+def parse(text: str) -> tuple[dict[str, str], list[str]]:
+    """SHA-256 by file name, and one line for every entry that cannot be one of a bundle."""
+    sums: dict[str, str] = {}
+    faults = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        match = _LINE.fullmatch(line)
+        if match is None:
+            faults.append(f"{SUMS}: line {number} is not '<sha256>  <file>'")
+        elif not _stays_inside(match[2]):
+            faults.append(f"{SUMS}: line {number} names a file outside the bundle: {match[2]}")
+        elif match[2] in sums:
+            faults.append(f"{SUMS}: line {number} names {match[2]} again")
+        else:
+            sums[match[2]] = match[1]
+    return sums, faults
+
+
+def _stays_inside(name: str) -> bool:
+    path = PurePosixPath(name)
+    return not path.is_absolute() and ".." not in path.parts and "\\" not in name and str(path) == name

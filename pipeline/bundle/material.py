@@ -1,0 +1,152 @@
+"""The material's C, spelled out with its numbers, so that a shader needs no table of constants."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from pipeline.config import Config, Section
+from pipeline.optics import fresnel
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import trapezoid
+
+REFLECTANCE = "reflectance.csv"
+_NODES = 257
+# where between two nodes linear interpolation is held against the formula
+_BETWEEN = 16
+
+FORMULA = (
+    "C = (R(cos_half) / divisor)^exponent * (1 + wi.wr)^2 / (cos(theta_i) cos(theta_r) w^2) * D, "
+    "cos_half = sqrt((1 + wi.wr) / 2)"
+)
+SHADOWING = "D = min(1, (wi.z + wr.z) min(wi.z, wr.z) / cos_half^2): symmetric V grooves, Cook & Torrance 1982"
+NO_SHADOWING = "D = 1"
+REFLECTANCES = {
+    "none": "R = 1",
+    "schlick": "R = F0 + (1 - F0) (1 - cos_half)^5, F0 = schlick_f0",
+    "dielectric": "R = (|r_s|^2 + |r_p|^2) / 2 of Fresnel from air onto the index in 'samples'",
+    "conductor": "R = sum over samples of luminous_weight (|r_s|^2 + |r_p|^2) / 2, Fresnel from air onto "
+    "n + ik; the metal's colour at normal incidence is inside I_p",
+}
+
+
+class Samples(Section):
+    """Index n + ik of the medium at wavelengths, and the weight of each in R; one without dispersion."""
+
+    lambda_nm: list[float] | None
+    n: list[float]
+    k: list[float]
+    luminous_weight: list[float]
+
+
+class ReflectanceTable(Section):
+    """R on equidistant nodes of cos_half in [0, 1], for shaders; largest_error: of R, by interpolation."""
+
+    file: Literal["reflectance.csv"]
+    nodes: int
+    interpolation: Literal["linear"]
+    largest_error: float
+
+
+class MaterialEntry(Section):
+    """C = (R / divisor)^exponent G D / w^2 with all numbers; `ior` and `metal` say where they are from."""
+
+    fresnel: Literal["none", "schlick", "dielectric", "conductor"]
+    normalisation: Literal["relative", "absolute"]
+    shadowing: bool
+    ior: float | None
+    metal: str | None
+    formula: str
+    reflectance: str
+    shadowing_formula: str
+    schlick_f0: float | None
+    samples: Samples | None
+    divisor: float
+    exponent: Literal[1, 2]
+    reflectance_table: ReflectanceTable | None
+
+
+@dataclass(frozen=True)
+class Medium:
+    """What light is reflected by: complex indices (L,) and their weights (L,) in the mean reflectance."""
+
+    lambda_nm: Array | None
+    index: np.ndarray
+    weight: Array
+
+    def reflectance(self, cos_half: Array) -> Array:
+        """Weighted mean of Fresnel's reflectance (...,) at cosines (...,)."""
+        return np.asarray(fresnel.reflectance(cos_half[..., None], self.index) @ self.weight)
+
+    def samples(self) -> Samples:
+        """As the manifest has it."""
+        return Samples(
+            lambda_nm=None if self.lambda_nm is None else self.lambda_nm.tolist(),
+            n=self.index.real.tolist(),
+            k=self.index.imag.tolist(),
+            luminous_weight=self.weight.tolist(),
+        )
+
+
+def medium(config: Config) -> Medium | None:
+    """The medium of a dielectric or a conductor; a metal is averaged as the eye's Y weighs it."""
+    if config.material.fresnel == "dielectric":
+        return Medium(None, np.array([config.material.ior], dtype=complex), np.ones(1))
+    if config.material.fresnel == "conductor":
+        quadrature = trapezoid(config.spectrum, config.table.step_nm)
+        index = fresnel.metal_index(config.material.metal, quadrature.lambda_nm)
+        return Medium(quadrature.lambda_nm, index, quadrature.weights[:, 1])
+    return None
+
+
+def entry(config: Config) -> MaterialEntry:
+    """The manifest's material: pipeline.optics.brdf.direction_factor in numbers."""
+    material, found = config.material, medium(config)
+    conductor, relative = material.fresnel == "conductor", material.normalisation == "relative"
+    return MaterialEntry(
+        fresnel=material.fresnel,
+        normalisation=material.normalisation,
+        shadowing=material.shadowing,
+        ior=material.ior if material.fresnel in ("schlick", "dielectric") else None,
+        # a file's folder is this machine's business
+        metal=Path(material.metal).name if conductor else None,
+        formula=FORMULA,
+        reflectance=REFLECTANCES[material.fresnel],
+        shadowing_formula=SHADOWING if material.shadowing else NO_SHADOWING,
+        schlick_f0=float(fresnel.schlick(1.0, material.ior)) if material.fresnel == "schlick" else None,
+        samples=None if found is None else found.samples(),
+        # an absolute conductor's normal reflectance is inside I_p, so only the ratio is left
+        divisor=_at_normal(config, found) if relative or conductor else 1.0,
+        # the paper's F is squared as it is printed
+        exponent=2 if relative and material.fresnel == "schlick" else 1,
+        reflectance_table=None if found is None or not conductor else _describe(found),
+    )
+
+
+def _at_normal(config: Config, found: Medium | None) -> float:
+    """R(1)."""
+    if found is not None:
+        return float(found.reflectance(np.array(1.0)))
+    return float(fresnel.schlick(1.0, config.material.ior)) if config.material.fresnel == "schlick" else 1.0
+
+
+def _describe(found: Medium) -> ReflectanceTable:
+    cos, values = reflectance_table(found)
+    fine = np.linspace(0.0, 1.0, (_NODES - 1) * _BETWEEN + 1)
+    error = np.abs(np.interp(fine, cos, values) - found.reflectance(fine))
+    return ReflectanceTable(
+        file="reflectance.csv", nodes=_NODES, interpolation="linear", largest_error=float(error.max())
+    )
+
+
+def reflectance_table(found: Medium) -> tuple[Array, Array]:
+    """cos_half and R on 257 equidistant nodes."""
+    cos = np.linspace(0.0, 1.0, _NODES)
+    return cos, found.reflectance(cos)
+
+
+def reflectance_csv(found: Medium) -> str:
+    """cos_half,R with 9 significant digits."""
+    rows: Any = zip(*reflectance_table(found), strict=True)
+    return "cos_half,R\n" + "".join(f"{cos:.9g},{value:.9g}\n" for cos, value in rows)

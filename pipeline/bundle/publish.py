@@ -1,0 +1,185 @@
+"""Publish: artifacts -> a folder that stands alone, named by its content and never overwritten."""
+
+import errno
+import json
+import shutil
+import tempfile
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+
+from pipeline.bundle import checksums, exr, material, precision, readme
+from pipeline.bundle import manifest as sections
+from pipeline.bundle.manifest import MANIFEST, Manifest, MapImage, TableImage
+from pipeline.bundle.verify import summary, verify
+from pipeline.config import Config
+from pipeline.errors import DamagedError
+from pipeline.optics.geometry import Array
+from pipeline.progress import Progress, silent
+from pipeline.stages import table as table_stage
+from pipeline.stages.validate import REPORT
+from pipeline.store import Artifact, writing
+from pipeline.tables.taylor import TaylorTable
+
+EVALUATE, README = "evaluate.py", "README.md"
+TABLES, MAPS = "tables", "maps"
+# as pipeline.images.write_xyz names them
+MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
+_PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
+
+
+def publish(config: Config, inputs: Mapping[str, Artifact], out: Path, progress: Progress = silent) -> Path:
+    """Writes the bundle `<name>-<version>+<digest>` under `out` and returns its folder.
+
+    inputs: the artifacts surface, stack, table, render and validate. The digest is over content, so the same
+    content gives the same folder and a second time nothing is written. The folder appears by one rename.
+    Raises AccuracyError where half precision would lose the digits, DamagedError where the folder stands
+    already and is not what it was, StorageError where the disk refuses.
+    """
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(prefix=".publishing-", dir=out))
+        try:
+            # a folder of its own: mkdtemp's is closed to everybody else
+            folder = beside / "bundle"
+            folder.mkdir()
+            _write(config, inputs, folder, progress)
+            digest = checksums.write(folder)
+            target = out / f"{config.name}-{config.publish.version}+{digest}"
+            _place(folder, target)
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
+    progress("publish", 1.0)
+    return target
+
+
+def published(config: Config, keys: Mapping[str, str], out: Path) -> Path | None:
+    """The bundle under `out` that was published from artifacts of these keys by this config, if it stands."""
+    expected = {"config": sections.resolved_config(config), "artifacts": {n: keys[n] for n in sections.STAGES}}
+    for page in sorted(out.glob(f"{config.name}-{config.publish.version}+*/{MANIFEST}")):
+        try:
+            found = json.loads(page.read_text(encoding="utf-8"))
+            sealed = checksums.of_sums(page.parent)
+        except (OSError, ValueError):
+            continue
+        if found.get("provenance") == expected and page.parent.name.endswith(f"+{sealed}"):
+            return page.parent
+    return None
+
+
+def _place(folder: Path, target: Path) -> None:
+    """Moves a finished bundle to its name; one that stands there already stays, if it is unharmed."""
+    try:
+        # a rename would replace an empty folder
+        if not target.exists():
+            folder.rename(target)
+            return
+    except OSError as error:
+        # somebody else published the same content meanwhile
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+    faults = verify(target)
+    if faults:
+        raise DamagedError(
+            f"{target}: this content was published before, and the folder is not what it was: "
+            f"{summary(faults)}. Move it away and publish again"
+        )
+
+
+def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:
+    """Every file but SHA256SUMS."""
+    table = table_stage.load(inputs["table"])
+    scale = precision.scales(table, config.publish.precision)
+    # measured first: it may refuse
+    half = precision.measure_half(config, table, scale) if config.publish.precision == "half" else None
+    tables = _write_tables(config, table, scale, folder, progress)
+    maps = _copy_maps(inputs["render"], folder)
+    report = inputs["validate"].folder / REPORT
+    if report.is_file():
+        shutil.copyfile(report, folder / REPORT)
+    found = material.medium(config)
+    described = material.entry(config)
+    if found is not None and described.reflectance_table is not None:
+        _write_text(folder / material.REFLECTANCE, material.reflectance_csv(found))
+    page = Manifest(
+        schema_version=sections.SCHEMA_VERSION,
+        name=config.name,
+        version=config.publish.version,
+        licence=config.publish.licence or "not stated",
+        made_by=sections.made_by(inputs),
+        conventions=sections.CONVENTIONS,
+        units=sections.units(config),
+        evaluation=sections.EVALUATION,
+        grid=sections.grid_entry(config),
+        colour=sections.colour_entry(config),
+        material=described,
+        precision=config.publish.precision,
+        tables=tables,
+        maps=maps,
+        report=REPORT if report.is_file() else None,
+        coverage=sections.coverage(config, inputs),
+        predicted_error={key: inputs["stack"].summary.get(key) for key in _PREDICTED},
+        measured_error=inputs["validate"].summary,
+        half_precision=half,
+        surface=inputs["surface"].summary,
+        provenance=sections.provenance(config, inputs),
+    )
+    _write_text(folder / MANIFEST, page.text())
+    _write_text(folder / README, readme.text(page))
+    source = files("pipeline.bundle").joinpath(EVALUATE).read_text(encoding="utf-8")
+    _write_text(folder / EVALUATE, source)
+
+
+def _write_tables(
+    config: Config, table: TaylorTable, scale: Array, folder: Path, progress: Progress
+) -> list[TableImage]:
+    """tables/I_00.exr ... and their entries."""
+    (folder / TABLES).mkdir()
+    stored = config.publish.precision
+    lost = precision.subnormal_shares(table, scale) if stored == "half" else None
+    entries = []
+    for p, plane in enumerate(precision.planes(table, scale, stored)):
+        name = f"{TABLES}/I_{p:02d}.exr"
+        exr.write_rgba(folder / name, plane)
+        entries.append(
+            TableImage(
+                file=name,
+                width=plane.shape[1],
+                height=plane.shape[0],
+                channels=sorted(exr.CHANNELS),
+                pixel_type=stored,
+                p=p,
+                scale=float(scale[p]),
+                half_subnormal_share=None if lost is None else float(lost[p]),
+            )
+        )
+        progress("publish", 0.9 * (p + 1) / len(scale))
+    return entries
+
+
+def _copy_maps(render: Artifact, folder: Path) -> list[MapImage]:
+    """The render artifact's maps under maps/, and their entries."""
+    (folder / MAPS).mkdir()
+    entries = []
+    for found in render.summary["maps"]:
+        for name in (found["exr"], found["png"]):
+            shutil.copyfile(render.folder / name, folder / MAPS / name)
+        entries.append(
+            MapImage(
+                file=f"{MAPS}/{found['exr']}",
+                width=render.summary["size"],
+                height=render.summary["size"],
+                channels=list(MAP_CHANNELS),
+                pixel_type="float",
+                theta_deg=found["theta_deg"],
+                phi_deg=found["phi_deg"],
+                png=f"{MAPS}/{found['png']}",
+                exposure_ru=render.summary["exposure_ru"],
+            )
+        )
+    return entries
+
+
+def _write_text(path: Path, text: str) -> None:
+    # one line end everywhere, so that the digest does not depend on the system
+    path.write_text(text, encoding="utf-8", newline="\n")

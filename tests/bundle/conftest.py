@@ -1,0 +1,68 @@
+"""A small bake, made once: a sinusoid's artifacts in a store of the test session."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.config import Config, parse
+from pipeline.progress import silent
+from pipeline.stages.render import RENDER
+from pipeline.stages.stack import STACK
+from pipeline.stages.surface import SURFACE
+from pipeline.stages.table import TABLE
+from pipeline.store import Artifact, Store
+
+SMALL: dict[str, Any] = {
+    "name": "small",
+    "surface": {"recipe": {"kind": "sinusoid", "period_um": 2.0, "size_um": 16.0, "pitch_um": 0.1}},
+    "coherence": {"sigma_um": 3.0},
+    "table": {"resolution": 41, "power": 3.0, "tolerance": 1e-2},
+    "render": {"size": 16},
+}
+# one light, and views around the normal
+SCENE: dict[str, Any] = {"lights": [{"theta_deg": 30.0}], "views": {"theta_max_deg": 45.0}}
+
+
+def small(**sections: Any) -> Config:
+    """The small config with some keys of its sections replaced."""
+    document = {**SMALL}
+    for name, keys in sections.items():
+        document[name] = {**SMALL[name], **keys} if isinstance(SMALL.get(name), dict) else keys
+    return parse(document, "test", Path())
+
+
+class Baker:
+    """Bakes configs into one store; equal artifacts are made once."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def __call__(self, config: Config) -> dict[str, Artifact]:
+        made: dict[str, Artifact] = {}
+        for stage in (SURFACE, STACK, TABLE, RENDER):
+            key = stage.key(config, {name: artifact.key for name, artifact in made.items()})
+            if not self._store.has(stage.name, key):
+                with self._store.create(stage.name, key, {"version": stage.version}) as (folder, record):
+                    record["summary"] = stage.produce(config, made, folder, silent)
+                    record["provenance"] = {
+                        "numpy": "2.0.0",
+                        "device": "a device",
+                        "driver": "1.0",
+                        "seconds": 1.5,
+                    }
+            made[stage.name] = self._store.open(stage.name, key)
+        made["validate"] = self._validated(made["render"].key)
+        return made
+
+    def _validated(self, key: str) -> Artifact:
+        if not self._store.has("validate", key):
+            with self._store.create("validate", key, {"version": 1}) as (folder, record):
+                (folder / "report.html").write_text("<p>measured</p>", encoding="utf-8")
+                record["summary"] = {"random": {"power": {"median": 1e-3}}}
+        return self._store.open("validate", key)
+
+
+@pytest.fixture(scope="session")
+def bake(tmp_path_factory: pytest.TempPathFactory) -> Baker:
+    return Baker(Store(tmp_path_factory.mktemp("store")))

@@ -1,0 +1,175 @@
+"""Publishing: what stands in a bundle, under which name, and what never happens to it."""
+
+import json
+import os
+import platform
+import re
+import socket
+import stat
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from pipeline.bundle import checksums, exr
+from pipeline.bundle.manifest import Manifest
+from pipeline.bundle.publish import publish
+from pipeline.bundle.verify import verify
+from pipeline.errors import DamagedError, StorageError
+from pipeline.stages import table as table_stage
+from pipeline.tables import grid
+
+from .conftest import SCENE, Baker, small
+
+
+def manifest_of(folder: Path) -> Manifest:
+    return Manifest.model_validate_json((folder / "manifest.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def bundle(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    config = small()
+    return publish(config, bake(config), tmp_path_factory.mktemp("out"))
+
+
+def test_a_fresh_bundle_has_no_faults(bundle: Path) -> None:
+    assert verify(bundle) == []
+
+
+def test_the_folder_is_named_by_its_content(bundle: Path) -> None:
+    assert bundle.name == f"small-1.0.0+{checksums.of_sums(bundle)}"
+
+
+def test_what_a_bundle_holds(bundle: Path) -> None:
+    names = {path.relative_to(bundle).as_posix() for path in bundle.rglob("*") if path.is_file()}
+    powers = len(manifest_of(bundle).tables)
+    assert names == {
+        *(f"tables/I_{p:02d}.exr" for p in range(powers)),
+        *("manifest.json", "evaluate.py", "README.md", "SHA256SUMS", "report.html"),
+        *("maps/map_theta0_phi0.exr", "maps/map_theta0_phi0.png"),
+    }
+
+
+def test_texels_are_the_table(bake: Baker, bundle: Path) -> None:
+    table = table_stage.load(bake(small())["table"])
+    for entry in manifest_of(bundle).tables:
+        with OpenEXR.File(str(bundle / entry.file), separate_channels=True) as file:
+            assert file.header()["colorInteropID"] == "data"
+            channels = {name: channel.pixels for name, channel in file.channels().items()}
+        for c, name in enumerate("RGB"):
+            np.testing.assert_array_equal(channels[name], table.values[:, :, c, entry.p])
+        np.testing.assert_array_equal(channels["A"] == 1.0, table.computed)
+
+
+def test_the_mapping_told_is_the_grids(bundle: Path) -> None:
+    told = manifest_of(bundle).grid
+    t = 2.0 * np.arange(told.width) / (told.width - 1) - 1.0
+    u = told.u_max * np.abs(t) ** told.power * np.sign(t)
+    np.testing.assert_allclose(u, grid.nodes(told.width, told.power), rtol=1e-14, atol=1e-15)
+    assert (told.width, told.height) == (41, 41)
+
+
+def test_the_manifest_tells_errors_coverage_and_origin(bake: Baker, bundle: Path) -> None:
+    inputs, told = bake(small()), manifest_of(bundle)
+    assert told.measured_error == inputs["validate"].summary
+    assert told.predicted_error["order"] == inputs["stack"].summary["order"]
+    assert told.coverage.unknown_share == inputs["table"].summary["unknown_share"]
+    # pitch 0.1 um knows frequencies to 5 /um, light of 380 nm asks there at 5 * 0.38
+    assert told.coverage.known_radius == pytest.approx(1.9)
+    assert told.provenance.artifacts == {name: artifact.key for name, artifact in inputs.items()}
+    assert (told.made_by.device, told.made_by.driver) == ("a device", "1.0")
+    assert told.made_by.libraries["zarr"] == "not recorded"
+    assert told.licence == "not stated"
+
+
+def test_a_licence_is_told(bake: Baker, tmp_path: Path) -> None:
+    config = small(publish={"licence": "CC-BY-4.0"})
+    folder = publish(config, bake(config), tmp_path)
+    assert manifest_of(folder).licence == "CC-BY-4.0"
+    assert "CC-BY-4.0" in (folder / "README.md").read_text(encoding="utf-8")
+
+
+def test_nothing_of_this_machine_or_moment_is_inside(
+    bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(platform, "node", lambda: "this-very-host")
+    monkeypatch.setattr(socket, "gethostname", lambda: "this-very-host")
+    inputs = bake(small())
+    bundle = publish(small(), inputs, tmp_path)
+    folders = [str(tmp_path), str(inputs["table"].folder.parents[1]), str(Path(__file__).parents[2])]
+    for name in ("manifest.json", "README.md", "SHA256SUMS", "evaluate.py"):
+        text = (bundle / name).read_text(encoding="utf-8")
+        assert not [folder for folder in folders if folder in text]
+        assert "this-very-host" not in text
+        assert not re.search(r"\d{4}-\d\d-\d\d|\d\d:\d\d|seconds", text)
+
+
+def test_files_a_config_names_are_told_by_name_and_content(bake: Baker, tmp_path: Path) -> None:
+    light = tmp_path / "lamp.csv"
+    light.write_text("lambda_nm,power\n360,1\n830,2\n", encoding="utf-8")
+    config = small(spectrum={"illuminant": str(light)})
+    text = (publish(config, bake(config), tmp_path) / "manifest.json").read_text(encoding="utf-8")
+    told = json.loads(text)["provenance"]["config"]["spectrum"]["illuminant"]
+    assert told["file"] == "lamp.csv"
+    assert len(told["sha256"]) == 64
+    assert str(tmp_path) not in text
+
+
+def test_the_same_content_twice_is_one_bundle(bake: Baker, bundle: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in bundle.rglob("*")}
+    assert publish(small(), bake(small()), bundle.parent) == bundle
+    assert {path: path.stat().st_mtime_ns for path in bundle.rglob("*")} == before
+    assert [path.name for path in bundle.parent.iterdir()] == [bundle.name]
+
+
+def test_other_content_is_another_bundle(bake: Baker, bundle: Path) -> None:
+    config = small(material={"ior": 1.4})
+    other = publish(config, bake(config), bundle.parent)
+    assert other != bundle
+    assert verify(bundle) == verify(other) == []
+
+
+def test_a_damaged_folder_is_neither_taken_nor_mended(bake: Baker, tmp_path: Path) -> None:
+    folder = publish(small(), bake(small()), tmp_path)
+    (folder / "README.md").write_text("changed", encoding="utf-8")
+    with pytest.raises(DamagedError, match=r"README\.md was changed.*Move it away"):
+        publish(small(), bake(small()), tmp_path)
+    assert (folder / "README.md").read_text(encoding="utf-8") == "changed"
+    assert [path.name for path in tmp_path.iterdir()] == [folder.name]
+
+
+def test_an_interrupted_publish_leaves_nothing(bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(path: Path, _pixels: object) -> None:
+        if path.name == "I_03.exr":
+            raise KeyboardInterrupt
+        path.touch()
+
+    monkeypatch.setattr(exr, "write_rgba", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        publish(small(), bake(small()), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_is_told(bake: Baker, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(StorageError, match="cannot be written"):
+        publish(small(), bake(small()), tmp_path / "file" / "out")
+
+
+def test_an_exr_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match="disk full"):
+        exr.write_rgba(tmp_path / "none" / "a.exr", np.zeros((2, 2, 4), np.float32))
+
+
+def test_everybody_may_read_a_bundle(bundle: Path) -> None:
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE(bundle.stat().st_mode) == 0o777 & ~umask
+
+
+def test_a_scene_leaves_texels_out(bake: Baker, tmp_path: Path) -> None:
+    config = small(scene=SCENE, render={"lights": SCENE["lights"]})
+    told = manifest_of(publish(config, bake(config), tmp_path))
+    assert told.coverage.skipped_share > 0.3
+    assert told.provenance.config["scene"]["views"]["theta_max_deg"] == 45.0

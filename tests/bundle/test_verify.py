@@ -1,0 +1,155 @@
+"""Verify finds whatever differs, and reads nothing outside the folder."""
+
+import hashlib
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.bundle import checksums, exr
+from pipeline.bundle.open import bundle_evaluator
+from pipeline.bundle.publish import publish
+from pipeline.bundle.verify import verify
+from pipeline.errors import DamagedError
+
+from .conftest import Baker, small
+
+
+@pytest.fixture(scope="module")
+def whole(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return publish(small(), bake(small()), tmp_path_factory.mktemp("out"))
+
+
+@pytest.fixture
+def bundle(whole: Path, tmp_path: Path) -> Path:
+    """A copy to do harm to."""
+    return Path(shutil.copytree(whole, tmp_path / whole.name))
+
+
+def forged(folder: Path, harm: Callable[[Path], None]) -> Path:
+    """A bundle changed and then sealed again under its new digest: only the manifest can tell."""
+    harm(folder)
+    (folder / checksums.SUMS).unlink()
+    return folder.rename(folder.parent / f"{folder.name.rpartition('+')[0]}+{checksums.write(folder)}")
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_every_changed_byte_is_found(bundle: Path) -> None:
+    for name in names(bundle):
+        path = bundle / name
+        content = path.read_bytes()
+        for at in {0, len(content) // 2, len(content) - 1}:
+            path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+            assert verify(bundle), (name, at)
+        path.write_bytes(content)
+    assert verify(bundle) == []
+
+
+def test_every_missing_file_is_found(bundle: Path) -> None:
+    for name in names(bundle):
+        (bundle / name).rename(bundle.parent / "away")
+        assert any(f"{name} is missing" in fault for fault in verify(bundle)), name
+        (bundle.parent / "away").rename(bundle / name)
+
+
+def test_an_extra_file_is_found(bundle: Path) -> None:
+    (bundle / "tables" / "extra").touch()
+    assert verify(bundle) == ["tables/extra was added"]
+
+
+def test_another_name_is_found(bundle: Path) -> None:
+    moved = bundle.rename(bundle.parent / "small-1.0.0+0123456789ab")
+    assert any("its content's digest is" in fault for fault in verify(moved))
+
+
+def test_a_link_to_a_bundle_is_a_bundle(bundle: Path) -> None:
+    (bundle.parent / "latest").symlink_to(bundle)
+    assert verify(bundle.parent / "latest") == []
+
+
+def test_a_folder_that_is_none(tmp_path: Path) -> None:
+    assert "no such folder" in verify(tmp_path / "none")[0]
+
+
+def test_nothing_outside_is_read(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    secret = bundle.parent / "secret"
+    secret.write_text("secret", encoding="utf-8")
+    digest = hashlib.sha256(b"secret").hexdigest()
+    (bundle / "link").symlink_to(secret)
+    sums = bundle / checksums.SUMS
+    absolute = "".join(f"{digest}  {name}\n" for name in ("../secret", str(secret), "tables/../../secret", "link"))
+    sums.write_text(sums.read_text(encoding="utf-8") + absolute + "no line\n", encoding="utf-8")
+    hashed: list[Path] = []
+    from pipeline import digest as digests
+
+    original = digests.of_file
+
+    def recorded(path: Path) -> str:
+        hashed.append(path)
+        return original(path)
+
+    monkeypatch.setattr(digests, "of_file", recorded)
+    faults = verify(bundle)
+    assert all(path.resolve().is_relative_to(bundle) for path in hashed)
+    assert sum("outside the bundle" in fault for fault in faults) == 3
+    assert "link is not a plain file" in faults
+    assert any("is not '<sha256>  <file>'" in fault for fault in faults)
+
+
+def test_sums_that_are_no_text(bundle: Path) -> None:
+    (bundle / checksums.SUMS).write_bytes(b"\xff\xfe")
+    assert verify(bundle) == ["SHA256SUMS is not UTF-8 text"]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "fault"),
+    [
+        ('"schema_version": 1', '"schema_version": 2', "schema_version"),
+        ('"schema_version": 1', '"schema_version": 1, "more": 0', "more"),
+        ('"file": "tables/I_00.exr"', '"file": "../I_00.exr"', "tables.0.file"),
+        ('"file": "tables/I_00.exr"', '"file": "tables/none.exr"', "names tables/none.exr, which is missing"),
+        ('"version": "1.0.0"', '"version": "1.0.1"', "is of small-1.0.1"),
+        ('"p": 0', '"p": 7', "expected p = 0, 1"),
+        ('"height": 41', '"height": 43', "not of the grid's size"),
+        ('"precision": "float"', '"precision": "half"', "not RGBA of precision half"),
+    ],
+)
+def test_a_manifest_that_contradicts(bundle: Path, before: str, after: str, fault: str) -> None:
+    def harm(folder: Path) -> None:
+        path = folder / "manifest.json"
+        text = path.read_text(encoding="utf-8")
+        assert before in text
+        path.write_text(text.replace(before, after, 1), encoding="utf-8")
+
+    assert any(fault in line for line in verify(forged(bundle, harm)))
+
+
+@pytest.mark.parametrize(
+    ("size", "kind", "fault"),
+    [((40, 41), np.float32, "height is 40"), ((41, 41), np.float16, "pixel_type is half")],
+)
+def test_an_image_that_is_not_what_the_manifest_says(
+    bundle: Path, size: tuple[int, int], kind: type, fault: str
+) -> None:
+    path = "tables/I_01.exr"
+    folder = forged(bundle, lambda folder: exr.write_rgba(folder / path, np.zeros((*size, 4), kind)))
+    assert any(line.startswith(f"{path}: {fault}") for line in verify(folder))
+
+
+def test_an_image_that_is_none(bundle: Path) -> None:
+    def harm(folder: Path) -> None:
+        (folder / "tables" / "I_01.exr").write_text("no image", encoding="utf-8")
+
+    folder = forged(bundle, harm)
+    assert verify(folder) == ["tables/I_01.exr cannot be read as EXR"]
+
+
+def test_a_damaged_bundle_gives_no_light(bundle: Path) -> None:
+    (bundle / "evaluate.py").unlink()
+    with pytest.raises(DamagedError, match=r"evaluate\.py is missing"):
+        bundle_evaluator(bundle)
