@@ -32,8 +32,24 @@ def _surface_rows(summary: dict[str, Any]) -> Rows:
         ["height range (µm)", f"{s['range_um']:.4f}"],
         ["g = (2π σ_h / 500 nm)²", f"{s['g']:.3f}"],
         ["dominant periods", periods or "none"],
-        ["frequencies known", f"{100 * s['reach_covered']:.1f} %"],
+        ["band limit, beside 2/λ (1/µm)", "{:.3g} × {:.3g}, {:.3g}".format(*s["band_limit_per_um"], s["reach_per_um"])],
+        ["reachable frequencies known", f"{100 * s['reach_covered']:.1f} %"],
+        ["rms step across the seams (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["seam_step_um"]))],
+        ["rms step between samples (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["inner_step_um"]))],
+        *_cleaning_rows(summary["conditioning"]),
     ]
+
+
+def _cleaning_rows(done: dict[str, Any]) -> Rows:
+    """What was done to the scan, and to how many samples."""
+    rows = [
+        ["holes filled", f"{done['holes']} samples"],
+        ["levelled by", f"{done['level']} (rms removed {1e3 * done['removed_rms_um']:.2f} nm)"],
+    ]
+    if done["clip_percentile"] is not None:
+        low, high = done["clip_percentile"]
+        rows.append([f"clipped to {low:g}..{high:g} %", f"{done['clipped_low'] + done['clipped_high']} samples"])
+    return rows
 
 
 def _settings_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
