@@ -14,7 +14,7 @@ def doctor_command(as_json: bool) -> None:
     """
     from kernels import device
     from pipeline import provenance
-    from pipeline.errors import DeviceError
+    from pipeline.device_stack import require_device
 
     probes = device.probe_devices()
     versions = provenance.versions()
@@ -26,9 +26,7 @@ def doctor_command(as_json: bool) -> None:
         rows = [[p.platform, p.device, str(p.compute_units), p.fault or "works"] for p in probes]
         console.print_table(["platform", "device", "units", "kernel"], rows)
         click.echo(", ".join(f"{name} {number}" for name, number in versions.items()))
-    try:
-        used = device.default_device()
-    except device.NoDeviceError as error:
-        raise DeviceError(str(error)) from None
+    require_device()
+    used = device.default_device()
     if not as_json:
         click.echo(f"in use: {used.name} ({used.driver})")

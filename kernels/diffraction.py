@@ -57,9 +57,7 @@ def upload_stack(
     constants = {"TERMS": terms, "BLOCKS": blocks, "REACH_X": reach[0], "REACH_Y": reach[1]}
     offsets = [np.arange(-r, r + 1) * d for r, d in zip(reach, spacing_per_um, strict=True)]
     decay = np.exp(-(np.concatenate(offsets) ** 2) * inverse)
-    return DeviceStack(
-        device.upload(padded), device.upload(decay), grid, constants, half_range_um, band_per_um
-    )
+    return DeviceStack(device.upload(padded), device.upload(decay), grid, constants, half_range_um, band_per_um)
 
 
 def taylor_table(

@@ -352,6 +352,15 @@ class Config(Section):
     render: Render = Render()
     publish: Publish = Publish()
 
+    @model_validator(mode="after")
+    def maps_show_the_scene(self) -> Self:
+        """Without lights of their own, maps take the scene's."""
+        if self.scene is None or "lights" in self.render.model_fields_set:
+            return self
+        # frozen, but not yet handed out
+        object.__setattr__(self, "render", self.render.model_copy(update={"lights": self.scene.lights}))
+        return self
+
 
 # --- reading -----------------------------------------------------------------------------------------
 
@@ -379,7 +388,7 @@ def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
     try:
         config = Config.model_validate(document, context={"folder": folder})
     except ValidationError as error:
-        raise ConfigError(source, [_fault(e) for e in error.errors()]) from None
+        raise ConfigError(source, _merged([_fault(e) for e in error.errors()])) from None
     faults = _scene_faults(config)
     if faults:
         raise ConfigError(source, faults)
@@ -400,6 +409,14 @@ def _scene_faults(config: Config) -> list[tuple[str, str]]:
     ]
 
 
+def _merged(faults: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """One fault a key: a value that fits no form of a union is told once, with what each form expects."""
+    by_key: dict[str, list[str]] = {}
+    for key, text in faults:
+        by_key.setdefault(key, []).append(text)
+    return [(key, "; or ".join(dict.fromkeys(texts))) for key, texts in by_key.items()]
+
+
 def _fault(error: Any) -> tuple[str, str]:
     """A pydantic error as (key path, one sentence)."""
     # tags of unions ("blazed", "float") are pydantic's, not the user's keys; an unknown key is always theirs
@@ -414,7 +431,12 @@ def _fault(error: Any) -> tuple[str, str]:
     message = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "value_error":
         return key, message
-    return key, f"{message[0].lower()}{message[1:]}, got {error['input']!r}"
+    return key, f"{message[0].lower()}{message[1:]}, got {_shortened(error['input'])}"
+
+
+def _shortened(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:

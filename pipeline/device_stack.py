@@ -7,20 +7,26 @@ from pipeline.optics.coherence import sigma_f
 from pipeline.stack import Stack
 
 
-def upload(built: Stack) -> diffraction.DeviceStack:
-    """The stack on the default device. Raises DeviceError where none works."""
+def require_device() -> None:
+    """Raises DeviceError, with what was tried and the remedy, where no device works."""
     try:
-        return diffraction.upload_stack(
-            built.coefficients,
-            (built.row_zero, built.column_zero),
-            built.spacing_per_um,
-            built.reach,
-            sigma_f(built.sigma_um),
-            built.half_range_um,
-            built.band_per_um,
-        )
+        device.default_device()
     except device.NoDeviceError as error:
         raise DeviceError(str(error)) from None
+
+
+def upload(built: Stack) -> diffraction.DeviceStack:
+    """The stack on the default device. Raises DeviceError where none works."""
+    require_device()
+    return diffraction.upload_stack(
+        built.coefficients,
+        (built.row_zero, built.column_zero),
+        built.spacing_per_um,
+        built.reach,
+        sigma_f(built.sigma_um),
+        built.half_range_um,
+        built.band_per_um,
+    )
 
 
 def kernel_digest(name: str) -> str:

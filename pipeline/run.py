@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline import provenance
 from pipeline.config import Config
+from pipeline.device_stack import require_device
 from pipeline.progress import Progress, silent
 from pipeline.stages.render import RENDER
 from pipeline.stages.stack import STACK
@@ -71,6 +72,9 @@ def execute(
     `on_step` hears of each step: the seconds it took, None where it was cached.
     """
     keys = {step.stage.name: step.key for step in steps}
+    if any(step.stage.name in _ON_DEVICE and not step.cached for step in steps):
+        # better now than after the minutes before the first kernel
+        require_device()
     for step in steps:
         name, seconds = step.stage.name, None
         if store.has(name, step.key):

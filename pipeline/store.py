@@ -13,10 +13,8 @@ import contextlib
 import errno
 import json
 import os
-import platform
 import shutil
 import time
-import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,12 +22,11 @@ from typing import Any
 
 from filelock import FileLock
 
-from pipeline import digest
+from pipeline import digest, scratch
 from pipeline.errors import DamagedError, StorageError
 
 RECORD = "artifact.json"
 FORMAT = 1
-_ABANDONED_AFTER_S = 24 * 3600.0
 
 
 @dataclass(frozen=True)
@@ -67,8 +64,8 @@ class Store:
         return self.root / stage / key
 
     def has(self, stage: str, key: str) -> bool:
-        """Whether a finished artifact stands under this key (its content is checked when it is opened)."""
-        return (self.folder(stage, key) / RECORD).is_file()
+        """Whether an artifact stands under this key: folders appear whole. `open` checks its content."""
+        return self.folder(stage, key).is_dir()
 
     def describe(self, stage: str, key: str) -> Artifact:
         """The artifact with its record checked, its files not. Raises DamagedError."""
@@ -102,9 +99,7 @@ class Store:
         refuses.
         """
         with writing(self.root):
-            # not mkdtemp, which would hide the artifact from other users: the umask decides who reads it
-            folder = self.root / "tmp" / f"{os.getpid()}@{platform.node()}-{uuid.uuid4().hex}"
-            folder.mkdir(parents=True)
+            folder = scratch.make(self.root / "tmp")
         try:
             with writing(self.root):
                 whole = {"format": FORMAT, "stage": stage, "key": key, **record}
@@ -151,7 +146,7 @@ class Store:
         Returns the number of folders removed and the bytes they held.
         """
         now = time.time()
-        doomed = [p for p in self.root.glob("tmp/*") if _abandoned(p, now)]
+        doomed = [p for p in self.root.glob("tmp/*") if scratch.abandoned(p)]
         for folder in (p for p in self.root.glob("*/*") if p.is_dir() and p.parent.name != "tmp"):
             try:
                 damaged = bool(_faults(self._read(folder)))
@@ -191,25 +186,6 @@ def _age_s(path: Path, now: float) -> float:
         return now - path.stat().st_mtime
     except FileNotFoundError:
         return 0.0
-
-
-def _abandoned(folder: Path, now: float) -> bool:
-    """Whether nobody is writing in a temporary folder any more."""
-    return _age_s(folder, now) > _ABANDONED_AFTER_S or _dead(folder)
-
-
-def _dead(folder: Path) -> bool:
-    """Whether a temporary folder's name tells of a writer on this machine that is gone."""
-    pid, _, rest = folder.name.partition("@")
-    if rest.rpartition("-")[0] != platform.node() or not pid.isdigit():
-        return False
-    try:
-        os.kill(int(pid), 0)
-    except ProcessLookupError:
-        return True
-    except PermissionError:
-        return False
-    return False
 
 
 def _seal(folder: Path, record: dict[str, Any]) -> None:

@@ -285,7 +285,12 @@ def test_a_light_to_render_must_be_one_of_the_scenes():
     found = faults(left_out)
     assert list(found) == ["render.lights.1"]
     assert found["render.lights.1"].startswith("no light of [scene]")
-    assert list(faults(with_section("scene", lights=[{"theta_deg": 30}]))) == ["render.lights.0"]
+
+
+def test_maps_without_lights_of_their_own_take_the_scenes():
+    config = parse(with_section("scene", lights=[{"theta_deg": 30}]), "f", Path())
+    assert [light.theta_deg for light in config.render.lights] == [30.0]
+    assert config.render.size == 512
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,11 @@
 import errno
 import json
 import shutil
-import tempfile
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from pipeline import scratch
 from pipeline.bundle import checksums, exr, material, precision, readme
 from pipeline.bundle import manifest as sections
 from pipeline.bundle.manifest import MANIFEST, Manifest, MapImage, TableImage
@@ -23,6 +23,7 @@ from pipeline.tables.taylor import TaylorTable
 
 EVALUATE, README = "evaluate.py", "README.md"
 TABLES, MAPS = "tables", "maps"
+_BESIDE = ".publishing-"
 # as pipeline.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
 _PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
@@ -38,19 +39,24 @@ def publish(config: Config, inputs: Mapping[str, Artifact], out: Path, progress:
     """
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=".publishing-", dir=out))
+        _remove_abandoned(out)
+        folder = scratch.make(out, _BESIDE)
         try:
-            # a folder of its own: mkdtemp's is closed to everybody else
-            folder = beside / "bundle"
-            folder.mkdir()
             _write(config, inputs, folder, progress)
             digest = checksums.write(folder)
             target = out / f"{config.name}-{config.publish.version}+{digest}"
             _place(folder, target)
         finally:
-            shutil.rmtree(beside, ignore_errors=True)
+            shutil.rmtree(folder, ignore_errors=True)
     progress("publish", 1.0)
     return target
+
+
+def _remove_abandoned(out: Path) -> None:
+    """What killed publications left."""
+    for folder in out.glob(f"{_BESIDE}*"):
+        if scratch.abandoned(folder, _BESIDE):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def published(config: Config, keys: Mapping[str, str], out: Path) -> Path | None:

@@ -32,7 +32,10 @@ def _surface_rows(summary: dict[str, Any]) -> Rows:
         ["height range (µm)", f"{s['range_um']:.4f}"],
         ["g = (2π σ_h / 500 nm)²", f"{s['g']:.3f}"],
         ["dominant periods", periods or "none"],
-        ["band limit, beside 2/λ (1/µm)", "{:.3g} × {:.3g}, {:.3g}".format(*s["band_limit_per_um"], s["reach_per_um"])],
+        [
+            "band limit, beside 2/λ (1/µm)",
+            "{:.3g} × {:.3g}, {:.3g}".format(*s["band_limit_per_um"], s["reach_per_um"]),
+        ],
         ["reachable frequencies known", f"{100 * s['reach_covered']:.1f} %"],
         ["rms step across the seams (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["seam_step_um"]))],
         ["rms step between samples (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["inner_step_um"]))],

@@ -69,9 +69,7 @@ def condition(
         raise ValueError(f"expected one of {LEVELS}, got {level!r}")
     valid = np.isfinite(field.heights_um)
     if not valid.any():
-        raise ScanError(
-            "expected heights, found none: every sample of the scan is a hole; choose another channel"
-        )
+        raise ScanError("expected heights, found none: every sample of the scan is a hole; choose another channel")
     holes = int(valid.size - np.count_nonzero(valid))
     record = ConditioningRecord(holes, holes / valid.size, level)
     heights, record = _level(field, valid, record)

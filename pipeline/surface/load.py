@@ -83,9 +83,7 @@ def _check_values(file: str, heights: NDArray[np.float64]) -> int:
     check_shape(file, heights.shape)
     infinite = int(np.count_nonzero(np.isinf(heights)))
     if infinite:
-        raise fault(
-            file, "finite heights", f"{infinite} infinite values", "write holes as NaN, mend the rest"
-        )
+        raise fault(file, "finite heights", f"{infinite} infinite values", "write holes as NaN, mend the rest")
     holes = int(np.count_nonzero(np.isnan(heights)))
     if holes == heights.size:
         raise fault(file, "heights", "NaN everywhere", "export it again, or set surface.channel")
@@ -106,9 +104,7 @@ def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:
         )
 
 
-def _check_range(
-    file: str, heights_um: NDArray[np.float64], unit: tuple[float, Source], is_image: bool
-) -> None:
+def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Source], is_image: bool) -> None:
     found = float(np.nanmax(heights_um) - np.nanmin(heights_um))
     if found == 0.0:
         raise fault(
@@ -147,9 +143,7 @@ def _units(
         missing.append("surface.height_unit ('nm', 'um', ...)")
     if unit is None and scan.full_code is not None:
         missing.append(f"surface.height_range_um (height in um of code {scan.full_code:g} above 0)")
-    raise fault(
-        file, "units", f"a file ({scan.format}) that does not state them", f"set {' and '.join(missing)}"
-    )
+    raise fault(file, "units", f"a file ({scan.format}) that does not state them", f"set {' and '.join(missing)}")
 
 
 def _unit(file: str, scan: Scan, surface: Surface) -> tuple[float, Source] | None:

@@ -309,9 +309,7 @@ def test_gwy(tmp_path: Path, unit_xy: str, unit_z: str, pitch: tuple[float, floa
     fields = (("Phase", "deg", 5 * TOP_FIRST), ("Height", unit_z, TOP_FIRST))
     for number, (title, unit, data) in enumerate(fields):
         container[f"/{number}/data/title"] = title
-        container[f"/{number}/data"] = GwyDataField(
-            data, xreal=6e-6, yreal=10e-6, si_unit_xy=unit_xy, si_unit_z=unit
-        )
+        container[f"/{number}/data"] = GwyDataField(data, xreal=6e-6, yreal=10e-6, si_unit_xy=unit_xy, si_unit_z=unit)
     container.tofile(str(path))
     scan = read_scan(path, None)
     np.testing.assert_array_equal(scan.heights, HANDED)
@@ -600,9 +598,7 @@ def test_wanted_channel_that_is_not_there(tmp_path: Path) -> None:
 
 def test_units_of_length() -> None:
     assert micrometres("nm") == 1e-3
-    assert (
-        micrometres(" \u00b5m ") == micrometres("\u03bcm") == micrometres("[um]") == micrometres("~m") == 1.0
-    )
+    assert micrometres(" \u00b5m ") == micrometres("\u03bcm") == micrometres("[um]") == micrometres("~m") == 1.0
     assert micrometres("m") == 1e6
     assert micrometres("\u212b") == micrometres("\u00c5") == 1e-4
     assert [micrometres(u) for u in ("V", "A", "deg", "", "1/m")] == [None] * 5

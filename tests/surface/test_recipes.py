@@ -20,7 +20,7 @@ SNAKES = ("elaphe", "xenopeltis")
 
 
 def surface(kind: str, **keys: Any) -> HeightField:
-    return make(ADAPTER.validate_python({"kind": kind, **keys}))
+    return make(ADAPTER.validate_python({"kind": kind, "pitch_um": 0.1, **keys}))
 
 
 def order_amplitude(profile: np.ndarray, periods: int, phase: float, order: int) -> complex:
@@ -37,9 +37,7 @@ def order_amplitude(profile: np.ndarray, periods: int, phase: float, order: int)
     axis=st.sampled_from("xy"),
 )
 @settings(max_examples=25, deadline=None)
-def test_gratings_hold_whole_periods_exactly(
-    kind: str, period: float, size: float, pitch: float, axis: str
-) -> None:
+def test_gratings_hold_whole_periods_exactly(kind: str, period: float, size: float, pitch: float, axis: str) -> None:
     field = surface(kind, period_um=period, size_um=(size, size), pitch_um=pitch, axis=axis)
     length = field.size_um["xy".index(axis)]
     periods = max(1, round(size / period))
@@ -216,7 +214,7 @@ def test_seeds_decide_everything(kind: str) -> None:
     small = {"size_um": 10.0}
     first = surface(kind, seed=5, **small).heights_um
     np.testing.assert_array_equal(first, surface(kind, seed=5, **small).heights_um)
-    assert np.any(first != surface(kind, seed=-6, **small).heights_um)
+    assert np.any(first != surface(kind, seed=6, **small).heights_um)
 
 
 @pytest.mark.parametrize("kind", [*SNAKES, "gaussian"])

@@ -44,7 +44,7 @@ def scan(name: str, height_range_um: float) -> HeightField:
 
 
 def test_the_plain_numbers_of_a_sinusoid() -> None:
-    field = make(Sinusoid(kind="sinusoid", amplitude_um=0.1, size_um=(65.0, 32.5)))
+    field = make(Sinusoid(kind="sinusoid", amplitude_um=0.1, size_um=(65.0, 32.5), pitch_um=0.1))
     s = statistics(field)
     assert (s.shape, s.size_um, s.pitch_um) == ((325, 650), (65.0, 32.5), (0.1, 0.1))
     assert s.sigma_h_um == pytest.approx(0.1 / np.sqrt(2), rel=1e-12)
@@ -124,7 +124,7 @@ def test_a_weaker_neighbour_does_not_pull_a_line_away() -> None:
 
 
 def test_a_blaze_reports_its_harmonics() -> None:
-    first, second, *_ = statistics(make(Blazed(kind="blazed"))).periods
+    first, second, *_ = statistics(make(Blazed(kind="blazed", pitch_um=0.1))).periods
     assert (first.period_um, second.period_um) == pytest.approx((2.5, 1.25), rel=1e-4)
     # of M samples a period: |c_m|^2 = 1 / (2 M sin(pi m / M))^2, of the variance (1 - 1 / M^2) / 12
     shares = [2 / (50 * np.sin(np.pi * m / 25)) ** 2 * 12 / (1 - 1 / 625) for m in (1, 2)]
@@ -198,7 +198,9 @@ def test_the_real_xenopeltis() -> None:
 
 
 def test_a_plane_steps_at_its_seams_by_its_whole_rise() -> None:
-    field = make(TiltedMirror(kind="tilted_mirror", tilt_x_deg=2.0, tilt_y_deg=1.0, size_um=(10.0, 6.0)))
+    field = make(
+        TiltedMirror(kind="tilted_mirror", tilt_x_deg=2.0, tilt_y_deg=1.0, size_um=(10.0, 6.0), pitch_um=0.1)
+    )
     s = statistics(field)
     slopes = np.tan(np.radians([2.0, 1.0]))
     assert s.inner_step_um == pytest.approx(tuple(0.1 * slopes), rel=1e-9)

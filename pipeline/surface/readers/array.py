@@ -31,9 +31,7 @@ def read_npz(path: Path, channel: str | None) -> Scan:
         arrays = _matrices(archive)
         if not arrays:
             listed = ", ".join(archive.files[:4]) or "nothing"
-            raise fault(
-                path.name, "an .npz with a 2-D array", f"a zip of {listed}", "save the heights as .npy"
-            )
+            raise fault(path.name, "an .npz with a 2-D array", f"a zip of {listed}", "save the heights as .npy")
         names = list(arrays)
         name = names[pick_channel(path.name, names, channel)]
         heights = _heights(path, arrays[name])

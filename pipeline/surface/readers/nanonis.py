@@ -41,9 +41,7 @@ def read(path: Path, channel: str | None) -> Scan:
         # the range is in metres, and N pixels wide
         range_x, range_y = (float(metres) * 1e6 for metres in stored.header["scan_range"])
         pitch = range_x / heights.shape[1], range_y / heights.shape[0]
-    return Scan(
-        heights, um_per_unit, pitch, None, name, tuple(names), "Nanonis .sxm", library_version("nanonispy2")
-    )
+    return Scan(heights, um_per_unit, pitch, None, name, tuple(names), "Nanonis .sxm", library_version("nanonispy2"))
 
 
 @contextmanager

@@ -46,9 +46,7 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
             check_shape(path.name, chosen.nb_grid_pts[::-1])
             heights = _heights(chosen.topography().heights())
             pitch = _pitch(chosen, unit)
-    return Scan(
-        heights, unit, pitch, None, names[index], tuple(names), FORMATS[key], library_version(_LIBRARY)
-    )
+    return Scan(heights, unit, pitch, None, names[index], tuple(names), FORMATS[key], library_version(_LIBRARY))
 
 
 def _height_unit(channel: Any) -> float | None:

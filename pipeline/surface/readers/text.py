@@ -149,9 +149,7 @@ def _value_unit(path: Path, lines: _Lines) -> float | None:
         return None
     scale = micrometres(unit)
     if scale is None:
-        raise fault(
-            path.name, "heights in a unit of length", f"values in {unit!r}", "export the height channel"
-        )
+        raise fault(path.name, "heights in a unit of length", f"values in {unit!r}", "export the height channel")
     return scale
 
 
