@@ -1,6 +1,6 @@
 """Host side of the diffraction kernels: arrays in, arrays out; layouts as stated in opencl/*.cl."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,22 +61,18 @@ def upload_stack(
 
 
 def taylor_table(
-    stack: DeviceStack,
-    uv: np.ndarray,
-    lambda_um: np.ndarray,
-    weights: np.ndarray,
-    progress: Callable[[float], None],
-) -> np.ndarray:
-    """I_p at nodes: `uv` (nodes, 2), `lambda_um` (L,), `weights` (L, 3) -> float64 (nodes, 3, 2 N + 1).
+    stack: DeviceStack, uv: np.ndarray, lambda_um: np.ndarray, weights: np.ndarray
+) -> Iterator[tuple[slice, np.ndarray]]:
+    """I_p at nodes, tile by tile: which nodes, and their values in float64 (nodes of the tile, 3, 2 N + 1).
 
-    Every u must be >= 0: the stack holds that half plane and I_p(-u, -v) = (-1)^p I_p(u, v).
+    `uv` (nodes, 2), `lambda_um` (L,), `weights` (L, 3). Every u must be >= 0: the stack holds that half plane and
+    I_p(-u, -v) = (-1)^p I_p(u, v).
     """
     powers = 2 * stack.constants["TERMS"] - 1
     width = 2 * _LANES * stack.constants["BLOCKS"]
     program = device.program(("windowed_dft.cl", "taylor_table.cl"), stack.constants)
     series = _taylor_series(lambda_um, stack.half_range_um, stack.constants)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, _fourth_column(weights)))
-    out = np.empty((len(uv), 3, powers))
     tile = np.empty((_TILE, 3, width))
     result = device.result_buffer(tile.nbytes)
     for first in range(0, len(uv), _TILE):
@@ -94,9 +90,7 @@ def taylor_table(
             *(np.float64(f) for f in stack.band_per_um),
             result,
         )
-        out[first : first + count] = device.download(result, tile)[:count, :, :powers]
-        progress((first + count) / len(uv))
-    return out
+        yield slice(first, first + count), device.download(result, tile)[:count, :, :powers]
 
 
 def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:

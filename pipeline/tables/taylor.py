@@ -1,5 +1,6 @@
 """The paper's tables: I_p(u, v), p = 0 .. 2N, in X, Y and Z ([D14] eq. 8-12)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +9,16 @@ from numpy.typing import NDArray
 from kernels import diffraction
 from pipeline.config import Scene
 from pipeline.device_stack import upload
+from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
 from pipeline.progress import Progress, silent
 from pipeline.stack import Stack
 from pipeline.tables import grid
+
+
+_MOST_BYTES = 4 * 2**30
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,7 @@ class TaylorTable:
         width = np.gradient(u)
         inside = np.hypot(u[:, None], u) <= grid.U_MAX
         area = np.outer(width, width) * (inside & self.computed)
-        return float(np.sum(area * self.unknown) / np.sum(area))
+        return float(np.sum(area * self.unknown) / max(np.sum(area), np.finfo(float).tiny))
 
 
 def build(
@@ -55,8 +60,10 @@ def build(
 ) -> TaylorTable:
     """Tables of a Taylor stack under the light and observer of `quadrature` (weights as the integral has them).
 
-    Only one half plane is computed: heights are real, so I_p(-u, -v) = (-1)^p I_p(u, v).
+    Only one half plane is computed: heights are real, so I_p(-u, -v) = (-1)^p I_p(u, v). Memory is that of the table
+    and one tile. Raises AccuracyError where the table would not fit.
     """
+    _check_memory(resolution, 2 * stack.terms - 1)
     u = grid.nodes(resolution, power)
     computed = _reachable_nodes(u, scene)
     half_plane = (u > 0.0) | ((u == 0.0) & (u[:, None] >= 0.0))
@@ -64,27 +71,25 @@ def build(
     nodes = np.stack([u[u_index], u[v_index]], axis=-1)
     # a border node may stand a little outside the disc of radius 2, where the stack ends
     radius = np.maximum(np.hypot(nodes[:, 0], nodes[:, 1]) / grid.U_MAX, 1.0)
-    i_p = node_values(stack, quadrature, nodes / radius[:, None], progress)
-
-    values = np.zeros((resolution, resolution, *i_p.shape[1:]), dtype=np.float32)
-    sign = np.where(np.arange(i_p.shape[2]) % 2 == 0, 1.0, -1.0)
-    values[resolution - 1 - v_index, resolution - 1 - u_index] = sign * i_p
-    values[v_index, u_index] = i_p
+    powers = 2 * stack.terms - 1
+    values = np.zeros((resolution, resolution, 3, powers), dtype=np.float32)
+    sign = np.where(np.arange(powers) % 2 == 0, 1.0, -1.0)
+    for tile, i_p in _tiles(stack, quadrature, nodes / radius[:, None]):
+        rows, columns = v_index[tile], u_index[tile]
+        values[resolution - 1 - rows, resolution - 1 - columns] = sign * i_p
+        values[rows, columns] = i_p
+        progress("table", tile.stop / len(nodes))
     values[~computed] = 0.0
     return TaylorTable(values, computed, _unknown(stack, quadrature, u), power)
 
 
-def node_values(stack: Stack, quadrature: Quadrature, uv: Array, progress: Progress = silent) -> Array:
+def node_values(stack: Stack, quadrature: Quadrature, uv: Array) -> Array:
     """I_p (nodes, 3, 2 N + 1) in float64 at any (u, v) with u >= 0 and |(u, v)| <= 2."""
-    return np.asarray(
-        diffraction.taylor_table(
-            upload(stack),
-            uv,
-            1e-3 * quadrature.lambda_nm,
-            quadrature.weights,
-            lambda done: progress("table", done),
-        )
-    )
+    return np.concatenate([i_p.copy() for _, i_p in _tiles(stack, quadrature, uv)])
+
+
+def _tiles(stack: Stack, quadrature: Quadrature, uv: Array) -> Iterator[tuple[slice, Array]]:
+    return diffraction.taylor_table(upload(stack), uv, 1e-3 * quadrature.lambda_nm, quadrature.weights)
 
 
 def sum_powers(i_p: Array, w: Array) -> Array:
@@ -116,6 +121,15 @@ def look_up(table: TaylorTable, uvw: Array) -> Array:
         known = table.computed[at] | (weight == 0.0)
         total += np.where(known, weight, np.nan)[:, None] * corner
     return total
+
+
+def _check_memory(resolution: int, powers: int) -> None:
+    need = 4 * resolution**2 * 3 * powers
+    if need > _MOST_BYTES:
+        raise AccuracyError(
+            f"{powers} tables of {resolution} x {resolution} nodes need {need / 2**30:.1f} GiB, more than the "
+            f"{_MOST_BYTES / 2**30:.0f} GiB allowed. Lower table.resolution or raise table.tolerance (fewer terms)."
+        )
 
 
 def _reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
