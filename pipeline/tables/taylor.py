@@ -17,7 +17,6 @@ from pipeline.progress import Progress, silent
 from pipeline.stack import Stack
 from pipeline.tables import grid
 
-
 _MOST_BYTES = 4 * 2**30
 
 
