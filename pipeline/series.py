@@ -55,8 +55,7 @@ def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, or
     Raises AccuracyError where no order, or not this one, reaches the tolerance in float32 tables.
     """
     z = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
-    # two fifths of the budget for the truncation, which enters twice; the rounding is
-    # what it is
+    # two fifths of the budget for the truncation, which enters twice; the rounding is what it is
     chosen = order if order is not None else _taylor_order(z, 0.2 * tolerance)
     plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
     if plan.error > tolerance:

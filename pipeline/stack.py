@@ -65,7 +65,8 @@ def build(
 
     Raises AccuracyError where it would not fit into memory.
     """
-    field = crop_to_window(field.centred(), sigma_um)
+    # centred after the crop: what is left may lie off the whole patch's mid-range
+    field = crop_to_window(field, sigma_um).centred()
     width, height = field.size_um
     spacing = (1.0 / width, 1.0 / height)
     reach = window_reach(spacing, sigma_um, tolerance)

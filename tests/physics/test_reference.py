@@ -87,6 +87,17 @@ def test_fast_route_agrees_with_the_direct_sum(field: HeightField, sigma: float)
         assert np.nanmax(direct) > 1e-4
 
 
+def test_what_the_window_does_not_see_changes_nothing() -> None:
+    """A step of a micrometre at the patch's rim, ten sigma from the middle: the middle's own range counts."""
+    heights = rough(120, 120, (0.1, 0.1), 0.05).heights_um
+    stepped = heights.copy()
+    stepped[:, :8] += 1.0
+    wi, wr = pairs(20)
+    uvw, nm = geometry.uvw(wi, wr), np.array([LAMBDA_NM])
+    flat, tall = (Reference(HeightField(h, (0.1, 0.1)), 0.5, 380.0).power(uvw, nm) for h in (heights, stepped))
+    np.testing.assert_allclose(tall, flat, atol=1e-12)
+
+
 def test_a_constant_added_to_the_heights_changes_nothing() -> None:
     field = rough(40, 40, (0.1, 0.1), 0.2)
     lifted = HeightField(field.heights_um + 123.4, field.pitch_um)
