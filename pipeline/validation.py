@@ -58,6 +58,10 @@ def _integrand(config: Config, step_nm: float) -> Quadrature:
     return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
+def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourError]:
+    return colour_errors(found, truth, config.accuracy.exposure_ru)
+
+
 @dataclass(frozen=True)
 class RandomCheck:
     """A table against the reference on random directions: Y of |P|^2 integrated, and colours."""
@@ -78,7 +82,7 @@ def check_random(
     factor = brdf.direction_factor(config.material, trapezoid(config.spectrum, STEP_NM), wi, wr)
     scale = _integrand(config, config.table.step_nm).weights[:, 1].sum()
     power = relative_error(found[:, 1] / factor / scale, truth[:, 1] / factor / scale, MIRROR_FLOOR)
-    return RandomCheck(len(wi), power, colour_errors(found, truth))
+    return RandomCheck(len(wi), power, _colour_errors(config, found, truth))
 
 
 @dataclass(frozen=True)
@@ -110,13 +114,14 @@ def check_map(
     wi = np.broadcast_to(light, wr.shape)
     truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
-    return MapCheck(light, views, views.image(found), views.image(truth), colour_errors(found, truth))
+    return MapCheck(light, views, views.image(found), views.image(truth), _colour_errors(config, found, truth))
 
 
 def check_reference(field: HeightField, reference: Reference, config: Config, directions: int = 4) -> RelativeError:
     """The reference's fast route against the plain sum over samples, on a few directions and wavelengths."""
     wi, wr = random_pairs(config, directions, seed=_SEED + 1)
-    uvw = geometry.uvw(wi, wr)
+    # the mirror direction is within every scan's band
+    uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -1.5]]])
     nodes = trapezoid(config.spectrum, 100.0).lambda_nm[:3]
     direct = np.stack([power_direct(field, config.coherence.sigma_um, uvw, nm) for nm in nodes], axis=-1)
     known = np.isfinite(direct)

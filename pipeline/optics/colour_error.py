@@ -48,10 +48,10 @@ class ColourError:
     maximum: float
 
 
-def colour_errors(xyz: Array, reference: Array) -> list[ColourError]:
-    """Errors at each exposure of [D14] table 2; `xyz` and `reference` are (..., 3)."""
+def colour_errors(xyz: Array, reference: Array, asked_ru: float) -> list[ColourError]:
+    """Errors at each exposure of [D14] table 2 and at the one asked for; `xyz` and `reference` are (..., 3)."""
     errors = []
-    for exposure in EXPOSURES_RU:
+    for exposure in sorted({*EXPOSURES_RU, asked_ru}):
         difference = delta_e(xyz, reference, exposure)
         worst, tail = float(difference.max()), float(np.percentile(difference, 99.0))
         errors.append(ColourError(exposure, float(difference.mean()), tail, worst))

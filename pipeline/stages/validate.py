@@ -4,8 +4,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pipeline import validation
 from pipeline.config import Config
 from pipeline.evaluate import table_evaluator
@@ -85,9 +83,9 @@ def _curves(study: validation.Convergence, has_steps: bool, progress: Progress) 
 def _budget(config: Config, results: dict[str, Any]) -> dict[str, Any]:
     """The error asked for beside the largest mean error of the maps at its exposure."""
     asked, exposure = config.accuracy.delta_e, config.accuracy.exposure_ru
-    measured = [e["mean"] for m in results["maps"] for e in m["colour"] if np.isclose(e["exposure_ru"], exposure)]
-    met = None if asked is None else bool(max(measured) <= asked)
-    return {"delta_e": asked, "exposure_ru": exposure, "measured": max(measured, default=None), "met": met}
+    measured = max(e["mean"] for m in results["maps"] for e in m["colour"] if e["exposure_ru"] == exposure)
+    met = None if asked is None else measured <= asked
+    return {"delta_e": asked, "exposure_ru": exposure, "measured": measured, "met": met}
 
 
 VALIDATE = Stage("validate", 1, ("surface", "stack", "table", "render"), _parameters, _produce)
