@@ -22,6 +22,18 @@ __kernel void taylor_table(__global const double *stack, __global const double *
     double8 x[2 * BLOCKS], y[2 * BLOCKS], z[2 * BLOCKS];
     UNROLL for (int b = 0; b < 2 * BLOCKS; ++b) x[b] = y[b] = z[b] = 0.0;
 
+    /* G_n, with zeros before and after for the convolution */
+    double g_re[24 * BLOCKS], g_im[24 * BLOCKS];
+    double *const re_n = g_re + 8 * BLOCKS, *const im_n = g_im + 8 * BLOCKS;
+    UNROLL for (int b = 0; b < 3 * BLOCKS; ++b) {
+        vstore8((double8)0.0, b, g_re);
+        vstore8((double8)0.0, b, g_im);
+    }
+
+    /* how often n = 4 b + i counts in p = 8 b + lane: twice below the middle p / 2, once on it, never above */
+    const double8 near_middle[4] = {(double8)(1, 2, 2, 2, 2, 2, 2, 2), (double8)(0, 0, 1, 2, 2, 2, 2, 2),
+                                    (double8)(0, 0, 0, 0, 1, 2, 2, 2), (double8)(0, 0, 0, 0, 0, 0, 1, 2)};
+
     for (int l = 0; l < wavelengths; ++l) {
         const double fx = uv[node].x / lambda[l], fy = uv[node].y / lambda[l];
         if (fabs(fx) > fx_max || fabs(fy) > fy_max) continue;
@@ -29,26 +41,26 @@ __kernel void taylor_table(__global const double *stack, __global const double *
         double8 re[BLOCKS], im[BLOCKS];
         windowed_dft(stack, decay, grid, fx, fy, re, im);
 
-        /* G_n = series_n F_n, with zeros before and after for the convolution below */
-        double g_re[24 * BLOCKS], g_im[24 * BLOCKS];
-        double *const re_n = g_re + 8 * BLOCKS, *const im_n = g_im + 8 * BLOCKS;
+        /* G_n = series_n F_n */
         __global const double *series_re = series + l * 16 * BLOCKS, *series_im = series_re + 8 * BLOCKS;
         UNROLL for (int b = 0; b < BLOCKS; ++b) {
             const double8 c_re = vload8(b, series_re), c_im = vload8(b, series_im);
             vstore8(c_re * re[b] - c_im * im[b], b, re_n);
             vstore8(c_re * im[b] + c_im * re[b], b, im_n);
-            vstore8((double8)0.0, b, g_re);
-            vstore8((double8)0.0, b, g_im);
-            vstore8((double8)0.0, b, re_n + 8 * BLOCKS);
-            vstore8((double8)0.0, b, im_n + 8 * BLOCKS);
         }
 
-        /* sum over n + m = p of G_n . G_m, eight p at a time */
+        /* sum over n + m = p of G_n . G_m, eight p at a time: pairs n < m count twice */
         UNROLL for (int b = 0; b < 2 * BLOCKS; ++b) {
             double8 product = 0.0;
-            for (int n = max(0, 8 * (b - BLOCKS) + 1); n < min(TERMS, 8 * b + 8); ++n) {
+            for (int n = max(0, 8 * (b - BLOCKS) + 1); n < min(TERMS, 4 * b); ++n) {
                 product = fma((double8)re_n[n], vload8(0, re_n + 8 * b - n), product);
                 product = fma((double8)im_n[n], vload8(0, im_n + 8 * b - n), product);
+            }
+            product *= 2.0;
+            UNROLL for (int i = 0; i < 4; ++i) {
+                const int n = 4 * b + i;
+                product = fma(near_middle[i] * re_n[n], vload8(0, re_n + 8 * b - n), product);
+                product = fma(near_middle[i] * im_n[n], vload8(0, im_n + 8 * b - n), product);
             }
             x[b] = fma((double8)weights[l].x, product, x[b]);
             y[b] = fma((double8)weights[l].y, product, y[b]);
