@@ -9,7 +9,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pipeline.optics.colour_error import pixels
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.validation import Curve, MapCheck
 
@@ -82,14 +81,4 @@ def convergence(curves: Sequence[Curve], exposure_ru: float) -> bytes:
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize=8)
     panels[0].set_ylabel(f"mean ΔE at {exposure_ru:g} RU")
-    return _png(figure)
-
-
-def relative_error_histogram(found: Array, truth: Array, floor: float) -> bytes:
-    """How the relative error of |P|^2 is spread over random directions."""
-    error = np.abs(found - truth) / np.maximum(np.abs(truth), floor)
-    figure = Figure(figsize=(5.6, 3.2), layout="constrained")
-    axes = figure.subplots()
-    axes.hist(np.log10(np.maximum(error, 1e-12)), bins=60, color="#2a6f97")
-    axes.set(xlabel="log₁₀ relative error of |P|² (Y)", ylabel="directions", title="Random directions")
     return _png(figure)

@@ -1,15 +1,16 @@
 """The validation report: what was baked, how it looks, and how far it is from the truth."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.config import Config
 from pipeline.report.page import Page
+from pipeline.store import Artifact
 
 Rows = list[list[str]]
 
 
-def colour_rows(label: str, errors: Sequence[dict[str, float]]) -> Rows:
+def _colour_rows(label: str, errors: Sequence[dict[str, float]]) -> Rows:
     """Rows of a table of CIELAB errors, one an exposure."""
     return [
         [
@@ -69,22 +70,38 @@ def _settings_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
 
 
 def build(
-    config: Config,
-    summaries: dict[str, dict[str, Any]],
-    results: dict[str, Any],
-    pictures: dict[str, bytes],
-    maps: Sequence[tuple[bytes, str]],
+    config: Config, inputs: Mapping[str, Artifact], results: dict[str, Any], pictures: Mapping[str, bytes]
 ) -> str:
     """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
+    surface, stack, table, render = (inputs[name].summary for name in ("surface", "stack", "table", "render"))
     page = Page(config.name, "Diffraction BRDF: what was baked and how far it is from the exact sum.")
-    page.warnings(summaries["surface"]["warnings"])
+    page.warnings(surface["warnings"])
     page.section("BRDF maps", f"All views of one light each, at {config.render.exposure_ru:g} RU.")
-    page.pictures(maps)
+    page.pictures(
+        [
+            ((inputs["render"].folder / m["png"]).read_bytes(), f"θ = {m['theta_deg']:g}°, φ = {m['phi_deg']:g}°")
+            for m in render["maps"]
+        ]
+    )
     page.section("Surface")
-    page.table(["", ""], _surface_rows(summaries["surface"]))
+    page.table(["", ""], _surface_rows(surface))
     page.picture(pictures["surface"], "The height field as baked: levelled and centred, y up.")
     page.section("Table")
-    page.table(["", ""], _settings_rows(summaries["stack"], summaries["table"]))
+    page.table(["", ""], _settings_rows(stack, table))
+    _add_errors(page, results)
+    for name, png in pictures.items():
+        if name.startswith("comparison"):
+            page.picture(png, "Reference, table and their difference.")
+    page.section("How the error depends on the settings")
+    page.picture(
+        pictures["convergence"],
+        "Mean error as one setting varies and the others stay as configured (61 x 61 views, first light). Terms and "
+        "step are varied at the views themselves, without a grid between.",
+    )
+    return page.render()
+
+
+def _add_errors(page: Page, results: dict[str, Any]) -> None:
     page.section(
         "Error against the reference",
         "The reference integrates every nanometre, without Taylor series, table or interpolation. Colour error is "
@@ -93,24 +110,15 @@ def build(
     rows = [
         row
         for m in results["maps"]
-        for row in colour_rows(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"])
+        for row in _colour_rows(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"])
     ]
-    rows += colour_rows("random directions", results["random"]["colour"])
+    rows += _colour_rows("random directions", results["random"]["colour"])
     page.table(["where", "exposure (RU)", "mean", "99th %", "max"], rows)
-    power, reference = results["random"]["power"], results["reference"]
+    kinds = [
+        ("table on random directions", results["random"]["power"]),
+        ("reference against sums over samples", results["reference"]),
+    ]
     page.table(
         ["relative error of |P|²", "median", "99th %", "max"],
-        [
-            [
-                "table on random directions",
-                *(f"{power[k]:.1e}" for k in ("median", "percentile_99", "maximum")),
-            ],
-            [
-                "reference against sums over samples",
-                *(f"{reference[k]:.1e}" for k in ("median", "percentile_99", "maximum")),
-            ],
-        ],
+        [[name, *(f"{e[key]:.1e}" for key in ("median", "percentile_99", "maximum"))] for name, e in kinds],
     )
-    for name, caption in results["pictures"].items():
-        page.picture(pictures[name], caption)
-    return page.render()

@@ -32,41 +32,31 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     field = surface.load(inputs["surface"])
     evaluate = table_evaluator(table.load(inputs["table"]), config)
     reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
-    radius = render.map_radius(config)
-    results: dict[str, Any] = {
+    lights, radius = config.render.lights, render.map_radius(config)
+    directions = [render.light_direction(light) for light in lights]
+    checks = [validation.check_map(evaluate, reference, config, wi, radius, progress) for wi in directions]
+    built = stack.load(inputs["stack"])
+    study = validation.Convergence(built, evaluate, reference, config, directions[0], radius)
+    curves = _curves(study, inputs["table"].summary["wavelengths"] > 1, progress)
+    maps = [
+        {**light.model_dump(), "colour": [asdict(error) for error in check.colour]}
+        for light, check in zip(lights, checks, strict=True)
+    ]
+    results: Summary = {
         "reference": asdict(validation.check_reference(field, reference, config)),
         "random": asdict(validation.check_random(evaluate, reference, config, progress)),
-        "maps": [],
-        "pictures": {},
+        "maps": maps,
+        "convergence": [asdict(curve) for curve in curves],
+        "budget": _budget(config, maps),
     }
-    pictures = {"surface": plots.height_map(field)}
-    for light in config.render.lights:
-        check = validation.check_map(evaluate, reference, config, render.light_direction(light), radius, progress)
-        name = render.map_name(light)
-        results["maps"].append({**light.model_dump(), "colour": [asdict(e) for e in check.colour]})
+    exposures = config.render.exposure_ru, config.accuracy.exposure_ru
+    pictures = {"surface": plots.height_map(field), "convergence": plots.convergence(curves, exposures[1])}
+    for light, check in zip(lights, checks, strict=True):
         title = f"light from θ = {light.theta_deg:g}°, φ = {light.phi_deg:g}°"
-        pictures[name] = plots.map_comparison(check, config.render.exposure_ru, config.accuracy.exposure_ru, title)
-        results["pictures"][name] = f"Reference, table and their difference: {title}."
-    first_light = render.light_direction(config.render.lights[0])
-    built = stack.load(inputs["stack"])
-    study = validation.Convergence(built, evaluate, reference, config, first_light, radius)
-    curves = _curves(study, inputs["table"].summary["wavelengths"] > 1, progress)
-    results["convergence"] = [asdict(curve) for curve in curves]
-    pictures["convergence"] = plots.convergence(curves, config.accuracy.exposure_ru)
-    results["pictures"]["convergence"] = (
-        "How the mean error depends on each setting with the others as configured (61 x 61 views). Terms and step "
-        "are varied at the views themselves, without a grid between."
-    )
-    results["budget"] = _budget(config, results)
-    maps = [
-        ((inputs["render"].folder / m["png"]).read_bytes(), f"θ = {m['theta_deg']:g}°, φ = {m['phi_deg']:g}°")
-        for m in inputs["render"].summary["maps"]
-    ]
-    summaries = {name: inputs[name].summary for name in ("surface", "stack", "table")}
+        pictures[f"comparison_{render.map_name(light)}"] = plots.map_comparison(check, *exposures, title)
     for name, png in pictures.items():
         (folder / f"{name}.png").write_bytes(png)
-    page = validation_report.build(config, summaries, results, pictures, maps)
-    (folder / REPORT).write_text(page, encoding="utf-8")
+    (folder / REPORT).write_text(validation_report.build(config, inputs, results, pictures), encoding="utf-8")
     return results
 
 
@@ -80,10 +70,10 @@ def _curves(study: validation.Convergence, has_steps: bool, progress: Progress) 
     return curves
 
 
-def _budget(config: Config, results: dict[str, Any]) -> dict[str, Any]:
+def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
     """The error asked for beside the largest mean error of the maps at its exposure."""
     asked, exposure = config.accuracy.delta_e, config.accuracy.exposure_ru
-    measured = max(e["mean"] for m in results["maps"] for e in m["colour"] if e["exposure_ru"] == exposure)
+    measured = max(e["mean"] for m in maps for e in m["colour"] if e["exposure_ru"] == exposure)
     met = None if asked is None else measured <= asked
     return {"delta_e": asked, "exposure_ru": exposure, "measured": measured, "met": met}
 
