@@ -24,7 +24,7 @@ def _colour_rows(label: str, errors: Sequence[dict[str, float]]) -> Rows:
 
 def _surface_rows(summary: dict[str, Any]) -> Rows:
     s = summary["statistics"]
-    periods = ", ".join(f"{p['period_um']:.3f} µm at {p['direction_deg']:.0f}°" for p in s["periods"])
+    periods = ", ".join(f"{p['period_um']:.3f} µm at {round(p['direction_deg'])}°" for p in s["periods"])
     return [
         ["samples (x × y)", f"{s['shape'][1]} × {s['shape'][0]}"],
         ["size (µm)", f"{s['size_um'][0]:.4g} × {s['size_um'][1]:.4g}"],
@@ -62,7 +62,7 @@ def _settings_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
         ["Taylor order N", str(stack["order"])],
         ["tables I_p (p = 0..2N)", f"{table['powers_of_w']} of {n} × {n}, exponent a = {table['power']:g}"],
         ["wavelengths", str(table["wavelengths"])],
-        ["window reach (coefficients)", "{} × {}".format(*stack["window_reach"])],
+        ["window reach (coefficients)", "±{} × ±{}".format(*stack["window_reach"])],
         ["predicted error of |P|²", f"{stack['predicted_error']:.1e}"],
         ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
         ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
