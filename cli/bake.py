@@ -7,8 +7,7 @@ from typing import Any
 
 import click
 
-from cli import console
-from pipeline import config as configs
+from cli import console, sources
 from pipeline.config import Config
 
 
@@ -43,8 +42,8 @@ def validate_command(config_paths: tuple[Path, ...], out: Path, store_root: Path
 def _bake_all(
     paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, *, with_bundle: bool
 ) -> None:
-    loaded = [configs.load(path) for path in paths]
-    _refuse_same_names(loaded, paths)
+    loaded = load_all(paths)
+    _require_folders(loaded, out)
     results = [_bake(config, out, store_root, with_bundle) for config in loaded]
     if as_json:
         console.print_json(results)
@@ -68,15 +67,26 @@ def _refuse_missed_budgets(results: list[dict[str, Any]]) -> None:
         raise AccuracyError("\n".join(lines))
 
 
-def _refuse_same_names(loaded: list[Config], paths: tuple[Path, ...]) -> None:
-    """Two configs of one name would write into one folder."""
+def load_all(paths: tuple[Path, ...]) -> list[Config]:
+    """All configs, each of its own name: two of one name would write into one folder. Raises ConfigError."""
     from pipeline.errors import ConfigError
 
+    loaded = [sources.load(path) for path in paths]
     seen: dict[str, Path] = {}
     for config, path in zip(loaded, paths, strict=True):
         if config.name in seen:
             raise ConfigError(str(path), [("name", f"{config.name!r} is also the name of {seen[config.name]}")])
         seen[config.name] = path
+    return loaded
+
+
+def _require_folders(loaded: list[Config], out: Path) -> None:
+    """Better now than after the work. Raises StorageError."""
+    from pipeline.store import writing
+
+    for config in loaded:
+        with writing(out / config.name):
+            (out / config.name).mkdir(parents=True, exist_ok=True)
 
 
 def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> dict[str, Any]:
@@ -85,14 +95,8 @@ def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool)
     store = console.open_store(store_root)
     console.note(f"{config.name}:")
 
-    def tell(step: run.Step, seconds: float | None) -> None:
-        console.note(f"  {step.stage.name:<9} " + ("cached" if seconds is None else f"{seconds:.1f} s"))
-        if step.stage.name == "surface":
-            for text in store.describe("surface", step.key).summary["warnings"]:
-                console.warn(f"{config.name}: {text}")
-
     with console.showing_progress() as progress:
-        artifacts = run.execute(config, run.plan(config, store), store, progress, tell)
+        artifacts = run.execute(config, run.plan(config, store), store, progress, console.teller(config, store))
         files = _lay_out(store, artifacts, out / config.name)
         bundle = publish_bundle(config, store, artifacts, out / config.name, progress) if with_bundle else None
     return {
@@ -104,23 +108,17 @@ def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool)
 
 
 def _lay_out(store: Any, artifacts: dict[str, Any], folder: Path) -> list[Path]:
-    """Copies what people look at out of the store; what is there and the same stays."""
+    """Copies what people look at out of the store."""
+    from pipeline import scratch
+    from pipeline.stages.validate import REPORT
     from pipeline.store import writing
 
-    made = []
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in ("render", "validate"):
-            artifact = store.open(name, artifacts[name].key)
-            for file in sorted(artifact.record["files"]):
-                if name == "validate" and file != "report.html":
-                    continue
-                target = folder / file
-                beside = target.with_name(f".{target.name}.part")
-                shutil.copyfile(artifact.folder / file, beside)
-                beside.replace(target)
-                made.append(target)
-    return made
+    maps, report = (store.open(name, artifacts[name].key) for name in ("render", "validate"))
+    sources_of = [*(maps.folder / name for name in sorted(maps.record["files"])), report.folder / REPORT]
+    with writing(folder), scratch.replacing(folder) as beside:
+        for source in sources_of:
+            shutil.copyfile(source, beside / source.name)
+    return [folder / source.name for source in sources_of]
 
 
 def publish_bundle(config: Config, store: Any, artifacts: dict[str, Any], folder: Path, progress: Any) -> Path:
@@ -138,16 +136,10 @@ def publish_bundle(config: Config, store: Any, artifacts: dict[str, Any], folder
 
 
 def _tell(result: dict[str, Any]) -> None:
-    summary = result["stages"]["validate"]["summary"]
-    places = [(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"]) for m in summary["maps"]]
-    places.append(("random directions", summary["random"]["colour"]))
-    rows = [
-        [place, f"{e['exposure_ru']:g}", *(f"{e[key]:.3f}" for key in ("mean", "percentile_99", "maximum"))]
-        for place, errors in places
-        for e in errors
-    ]
+    from pipeline.report.validation_report import ERROR_COLUMNS, error_rows
+
     click.echo(f"{result['name']}: CIELAB error of the table against the exact sum")
-    console.print_table(["where", "RU", "mean", "99th %", "max"], rows)
+    console.print_table(ERROR_COLUMNS, error_rows(result["stages"]["validate"]["summary"]))
     for path in (*result["files"], result["bundle"]):
         if path is not None:
             click.echo(path)
@@ -155,30 +147,46 @@ def _tell(result: dict[str, Any]) -> None:
 
 @click.command("plan")
 @click.argument("config_paths", metavar="CONFIG...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@console.out_option
 @console.store_option
 @console.json_option
-def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_json: bool) -> None:
+def plan_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool) -> None:
     """Say what `run` would do: every stage cached or to do, why, and its cost. Computes nothing."""
-    from pipeline import run
-
     store = console.open_store(store_root)
-    plans = {}
-    for path in config_paths:
-        config = configs.load(path)
-        plans[config.name] = [
-            {
-                "stage": step.stage.name,
-                "key": step.key,
-                "state": "cached" if step.cached else "to do",
-                "reason": step.reason,
-                "cost": step.cost,
-            }
-            for step in run.plan(config, store)
-        ]
+    plans = {config.name: _plan(config, store, out / config.name) for config in load_all(config_paths)}
     if as_json:
         console.print_json(plans)
         return
     for name, steps in plans.items():
         click.echo(f"{name}:")
-        rows = [[s["stage"], s["state"], s["cost"], s["reason"]] for s in steps]
-        console.print_table(["stage", "state", "cost", "why"], rows)
+        console.print_table(["stage", "state", "cost"], [[s["stage"], s["state"], s["cost"]] for s in steps])
+        for step in steps:
+            if step["state"] == "to do":
+                click.echo(f"{step['stage']}: {step['reason']}")
+
+
+def _plan(config: Config, store: Any, folder: Path) -> list[dict[str, str]]:
+    """Every stage and, last, the bundle."""
+    from pipeline import run
+    from pipeline.bundle.publish import published
+
+    steps = run.plan(config, store)
+    rows = [
+        {
+            "stage": step.stage.name,
+            "key": step.key,
+            "state": "cached" if step.cached else "to do",
+            "reason": step.reason,
+            "cost": step.cost,
+        }
+        for step in steps
+    ]
+    standing = published(config, {step.stage.name: step.key for step in steps}, folder)
+    bundle = {
+        "stage": "bundle",
+        "key": "" if standing is None else standing.name,
+        "state": "to do" if standing is None else "cached",
+        "reason": f"none of this content stands in {folder}" if standing is None else run.UNCHANGED,
+        "cost": f"{config.table.resolution}² texels a table",
+    }
+    return [*rows, bundle]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from cli import console
+from cli import console, sources
 
 
 @click.command("bench")
@@ -18,10 +18,9 @@ def bench_command(config_path: Path, store_root: Path | None, as_json: bool) -> 
     is measured in the same run by chains of fused multiply-adds.
     """
     from pipeline import bench, run
-    from pipeline import config as configs
     from pipeline.stages import surface
 
-    config, store = configs.load(config_path), console.open_store(store_root)
+    config, store = sources.load(config_path), console.open_store(store_root)
     with console.showing_progress() as progress:
         artifacts = run.execute(config, run.plan(config, store, "surface"), store, progress)
         field = surface.load(store.open("surface", artifacts["surface"].key))

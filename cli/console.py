@@ -1,6 +1,7 @@
 """What commands share: options, progress on stderr, tables on stdout."""
 
 import json
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -50,12 +51,31 @@ def open_store(root: Path | None) -> Any:
     return Store(root or Path(platformdirs.user_cache_dir("diffract-bake")) / "store")
 
 
+class FiniteNumber(click.ParamType[float]):
+    """A number in a range; NaN and infinity are none."""
+
+    name = "number"
+
+    def __init__(self, low: float, high: float = math.inf) -> None:
+        self._low, self._high = low, high
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not (math.isfinite(number) and self._low <= number < self._high):
+            below = f" and below {self._high:g}" if math.isfinite(self._high) else ""
+            self.fail(f"expected a finite number from {self._low:g}{below}, got {value!r}", param, ctx)
+        return number
+
+
 def print_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=1))
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Left-aligned columns; the last one takes what is left and wraps by itself."""
+    """Left-aligned columns."""
     widths = [max(len(str(cell)) for cell in column) for column in zip(columns, *rows, strict=True)]
     for row in (columns, *rows):
         cells = [str(cell).ljust(width) for cell, width in zip(row, widths, strict=True)]
@@ -70,10 +90,33 @@ def note(text: str) -> None:
     click.echo(text, err=True)
 
 
+def warner(config: Any, store: Any) -> Callable[[Any, float | None], None]:
+    """Tells what the surface stage warns of, as soon as it stands."""
+
+    def on_step(step: Any, seconds: float | None) -> None:  # noqa: ARG001
+        if step.stage.name == "surface":
+            for text in store.describe("surface", step.key).summary["warnings"]:
+                warn(f"{config.name}: {text}")
+
+    return on_step
+
+
+def teller(config: Any, store: Any) -> Callable[[Any, float | None], None]:
+    """Tells of every step how long it took, and what the surface stage warns of."""
+    warn_of = warner(config, store)
+
+    def on_step(step: Any, seconds: float | None) -> None:
+        note(f"  {step.stage.name:<9} " + ("cached" if seconds is None else f"{seconds:.1f} s"))
+        warn_of(step, seconds)
+
+    return on_step
+
+
 @contextmanager
 def showing_progress() -> Iterator[Progress]:
     """A live bar on a terminal; elsewhere a line when a step that lasts begins to."""
-    if sys.stderr.isatty():
+    # without any stderr (2>&-) Python has none either
+    if sys.stderr is not None and sys.stderr.isatty():
         with _bar() as progress:
             yield progress
     else:
@@ -108,6 +151,7 @@ def _bar() -> Iterator[Progress]:
         def progress(step: str, done: float) -> None:
             if step not in tasks:
                 tasks[step] = bars.add_task(step, total=1.0)
-            bars.update(tasks[step], completed=done, visible=done < 1.0)
+            # what is done leaves at once, before the next line is written below it
+            bars.update(tasks[step], completed=done, visible=done < 1.0, refresh=done >= 1.0)
 
         yield progress

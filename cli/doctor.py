@@ -23,10 +23,10 @@ def doctor_command(as_json: bool) -> None:
         found = [{name: getattr(probe, name) for name in fields} for probe in probes]
         console.print_json({"devices": found, "versions": versions})
     else:
-        rows = [[p.platform, p.device, str(p.compute_units), p.fault or "works"] for p in probes]
-        console.print_table(["platform", "device", "units", "kernel"], rows)
-        click.echo(", ".join(f"{name} {number}" for name, number in versions.items()))
+        rows = [[p.device, str(p.compute_units), p.fault or "works"] for p in probes]
+        console.print_table(["device", "units", "kernel"], rows)
+        console.print_table(["library", "version"], list(versions.items()))
     require_device()
     used = device.default_device()
     if not as_json:
-        click.echo(f"in use: {used.name} ({used.driver})")
+        click.echo(f"in use: {used.name}")

@@ -45,7 +45,7 @@ def _read_directions(path: Path) -> list[list[float]]:
     from pipeline.errors import ScanError
 
     try:
-        text = sys.stdin.read() if str(path) == "-" else path.read_text(encoding="utf-8")
+        text = sys.stdin.read().removeprefix("\ufeff") if str(path) == "-" else path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ScanError(f"{path}: cannot be read as text ({error})") from None
     rows: list[list[float]] = []

@@ -33,9 +33,11 @@ def _bundle(folder: Path) -> dict[str, Any]:
     from pipeline.errors import DamagedError
 
     try:
-        manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise DamagedError(f"{folder}: not a bundle: manifest.json cannot be read ({error})") from None
+    if not isinstance(manifest, dict):
+        raise DamagedError(f"{folder}: not a bundle: manifest.json holds no table of keys")
     return manifest
 
 

@@ -1,9 +1,9 @@
 """The `diffract-bake` command: its groups, and faults told in one line with their exit code."""
 
+import errno
 import importlib
 import os
 import sys
-from typing import Any
 
 import click
 
@@ -56,35 +56,52 @@ def cli() -> None:
     """
 
 
-def main() -> Any:
+def main() -> None:
     """Entry point: runs the command and turns faults into exit codes."""
     from pipeline.errors import BakeError
 
     try:
-        return cli.main(standalone_mode=False)
+        with cli.make_context("diffract-bake", sys.argv[1:]) as context:
+            cli.invoke(context)
+        sys.stdout.flush()
     except click.exceptions.Exit as done:
         sys.exit(done.exit_code)
     except click.ClickException as error:
         error.show()
         sys.exit(2)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt, EOFError):
         click.echo("interrupted; finished stages are kept", err=True)
         sys.exit(130)
     except BakeError as error:
         for line in str(error).splitlines():
             click.echo(f"error: {line}", err=True)
         sys.exit(error.exit_code)
-    except BrokenPipeError:
-        # the reader of our output went away, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    except OSError as error:
+        sys.exit(_output_refused(error))
     except Exception as error:
-        if os.environ.get("DIFFRACT_BAKE_DEBUG"):
-            raise
-        kind = type(error).__name__
-        click.echo(
-            f"error: internal fault, please report it: {kind}: {error} "
-            "(set DIFFRACT_BAKE_DEBUG=1 for the whole traceback)",
-            err=True,
-        )
-        sys.exit(1)
+        sys.exit(_internal_fault(error))
+
+
+def _output_refused(error: OSError) -> int:
+    """Exit code where stdout takes no more: its reader went away (as `| head` does), or its disk is full."""
+    from pipeline.errors import StorageError
+    from pipeline.store import FULL
+
+    if error.errno not in (errno.EPIPE, *FULL):
+        return _internal_fault(error)
+    # what is still buffered would fail again at exit
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if error.errno == errno.EPIPE:
+        return 0
+    click.echo("error: stdout: no space left to write", err=True)
+    return StorageError.exit_code
+
+
+def _internal_fault(error: Exception) -> int:
+    if os.environ.get("DIFFRACT_BAKE_DEBUG"):
+        raise error
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    click.echo(
+        f"error: internal fault, please report it: {text} (DIFFRACT_BAKE_DEBUG=1 shows the whole traceback)", err=True
+    )
+    return 1

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from cli import console
+from cli import console, sources
 
 
 @click.command("publish")
@@ -19,12 +19,11 @@ def publish_command(config_path: Path, out: Path, store_root: Path | None, as_js
     content gives the same digest; a standing bundle is never overwritten.
     """
     from cli.bake import publish_bundle
-    from pipeline import config as configs
     from pipeline import run
 
-    config, store = configs.load(config_path), console.open_store(store_root)
+    config, store = sources.load(config_path), console.open_store(store_root)
     with console.showing_progress() as progress:
-        artifacts = run.execute(config, run.plan(config, store), store, progress)
+        artifacts = run.execute(config, run.plan(config, store), store, progress, console.teller(config, store))
         bundle = publish_bundle(config, store, artifacts, out / config.name, progress)
     if as_json:
         console.print_json({"bundle": str(bundle)})

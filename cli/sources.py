@@ -8,6 +8,16 @@ import click
 from cli import console
 
 
+def load(path: Path) -> Any:
+    """The config in a file, with every fault that can be seen before work starts. Raises ConfigError."""
+    from pipeline import config as configs
+    from pipeline import preflight
+
+    config = configs.load(path)
+    preflight.check(config, str(path))
+    return config
+
+
 def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
     """XYZ of pairs of directions from SOURCE, a bundle's folder or a config."""
     if source.is_dir():
@@ -16,9 +26,7 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
         from pipeline.bundle.open import bundle_evaluator
 
         return bundle_evaluator(source)
-    from pipeline import config as configs
-
-    return config_evaluator(configs.load(source), exact, store_root, progress)
+    return config_evaluator(load(source), exact, store_root, progress)
 
 
 def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
@@ -27,7 +35,7 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
 
     store = console.open_store(store_root)
     until = "surface" if exact else "table"
-    artifacts = run.execute(config, run.plan(config, store, until), store, progress)
+    artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
     artifact = store.open(until, artifacts[until].key)
     if exact:
         from pipeline.reference import reference_evaluator

@@ -47,7 +47,7 @@ def check_command(store_root: Path | None, as_json: bool) -> None:
 
 
 @store_command.command("collect")
-@click.option("--unused-days", type=click.FloatRange(0), help="Also remove artifacts unused for so many days.")
+@click.option("--unused-days", type=console.FiniteNumber(0), help="Also remove artifacts unused for so many days.")
 @console.store_option
 @console.json_option
 def collect_command(unused_days: float | None, store_root: Path | None, as_json: bool) -> None:

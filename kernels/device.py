@@ -5,6 +5,7 @@ cannot compile for it. Contexts do not survive a fork, so they are made lazily, 
 """
 
 import os
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -44,10 +45,16 @@ class Probe:
     handle: Any
 
 
+@cache
 def cache_folder() -> Path:
-    """Where compiled kernels are kept between processes."""
+    """Where compiled kernels are kept between processes; for this process alone where that cannot be written."""
     folder = Path(platformdirs.user_cache_dir("diffract-bake")) / "kernels"
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / "lock"):
+            pass
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="diffract-bake-kernels-"))
     return folder
 
 
@@ -145,7 +152,6 @@ class Program:
         cl = _opencl()
         self.device = default_device()
         text = "\n".join(source(name) for name in sources)
-        # signed zeros and infinities never matter here; NaN does (it marks what is unknown)
         options = ["-cl-mad-enable", *(f"-D{key}={value}" for key, value in sorted(constants.items()))]
         with _compiling():
             self._program = cl.Program(self.device.context, text).build(options)

@@ -7,7 +7,7 @@ each of them is sound.
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
     BaseModel,
@@ -59,7 +59,8 @@ def _file(name: str, info: ValidationInfo) -> str:
     try:
         path = (info.context["folder"] / name).resolve()
         found = path.is_file()
-    except OSError as error:
+    # a loop of links is a RuntimeError before Python 3.13
+    except (OSError, RuntimeError) as error:
         raise ValueError(f"cannot be read: {error}") from None
     if not found:
         raise ValueError(f"no such file: {path} (paths are relative to the config)")
@@ -211,7 +212,7 @@ class Surface(Section):
 class Coherence(Section):
     """The Gaussian window exp(-r^2 / (2 sigma^2)) of coherent light; 65 um = 4 sigma in [D14] 4.2."""
 
-    sigma_um: Positive = 16.25
+    sigma_um: Annotated[float, Field(ge=1e-3, le=1e4)] = 16.25
     boundary: Literal["periodic"] = "periodic"
 
 
@@ -230,6 +231,12 @@ class Spectrum(Section):
         if not 360 <= value[0] < value[1] <= 830:
             raise ValueError(f"expected [from, to] within the observer's 360..830 nm, got {list(value)}")
         return value
+
+    @model_validator(mode="after")
+    def a_line_has_no_range(self) -> Self:
+        if isinstance(self.illuminant, LaserLine) and "range_nm" in self.model_fields_set:
+            raise ValueError("range_nm has no meaning with a laser line; leave it out")
+        return self
 
     @field_validator("illuminant")
     @classmethod
@@ -275,6 +282,10 @@ class Material(Section):
         return value
 
 
+# an error of a tenth is no digit at all
+LARGEST_TOLERANCE = 0.1
+
+
 class Table(Section):
     """The paper's table: I_p on `resolution` x `resolution` nodes 2 |t|^power sign(t)."""
 
@@ -282,8 +293,8 @@ class Table(Section):
     resolution: Annotated[int, Field(ge=3, le=4001)] = 501
     power: Annotated[float, Field(ge=1, le=9)] = 5.0
     terms: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = "auto"
-    step_nm: Annotated[float, Field(gt=0, le=50)] = 5.0
-    tolerance: Annotated[float, Field(ge=1e-7, le=1e-1)] = 1e-4
+    step_nm: Annotated[float, Field(ge=0.1, le=50)] = 5.0
+    tolerance: Annotated[float, Field(ge=1e-7, le=LARGEST_TOLERANCE)] = 1e-4
 
     @field_validator("resolution")
     @classmethod
@@ -300,6 +311,10 @@ class Accuracy(Section):
     exposure_ru: Positive = 7500.0
 
 
+# a millionth of a degree is far below any lobe's width, and above the rounding of whole turns
+_SAME_DEG = 1e-6
+
+
 class Direction(Section):
     """A direction away from the surface: polar angle from the normal, azimuth from +x."""
 
@@ -308,8 +323,8 @@ class Direction(Section):
 
     def same_as(self, other: "Direction") -> bool:
         """Whether both point the same way, whole turns and the azimuth of the normal aside."""
-        turned = 0.0 if self.theta_deg == 0 else (self.phi_deg - other.phi_deg) % 360.0
-        return self.theta_deg == other.theta_deg and turned == 0.0
+        turned = 0.0 if self.theta_deg == 0 else (self.phi_deg - other.phi_deg + 180.0) % 360.0 - 180.0
+        return abs(self.theta_deg - other.theta_deg) < _SAME_DEG and abs(turned) < _SAME_DEG
 
 
 class Views(Section):
@@ -362,6 +377,9 @@ class Config(Section):
         return self
 
 
+_KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
+
+
 # --- reading -----------------------------------------------------------------------------------------
 
 
@@ -372,11 +390,12 @@ def load(path: Path) -> Config:
     """
     source = str(path)
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(source, [("", "no such config file")]) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(source, [("", f"cannot be read as UTF-8 text: {error}")]) from None
+        hint = "a config is a TOML text; for a scan see `diffract-bake inspect`"
+        raise ConfigError(source, [("", f"cannot be read as UTF-8 text ({error}); {hint}")]) from None
     # TOMLDecodeError, and Python's own limits on digits and on depth
     except (ValueError, RecursionError) as error:
         raise ConfigError(source, [("", f"not valid TOML: {error}")]) from None
@@ -389,7 +408,7 @@ def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
         config = Config.model_validate(document, context={"folder": folder})
     except ValidationError as error:
         raise ConfigError(source, _merged([_fault(e) for e in error.errors()])) from None
-    faults = _scene_faults(config)
+    faults = _scene_faults(config) + _repeated_lights(config)
     if faults:
         raise ConfigError(source, faults)
     return config
@@ -406,6 +425,17 @@ def _scene_faults(config: Config) -> list[tuple[str, str]]:
         )
         for i, light in enumerate(config.render.lights)
         if not any(light.same_as(other) for other in config.scene.lights)
+    ]
+
+
+def _repeated_lights(config: Config) -> list[tuple[str, str]]:
+    """Lights whose maps would be one: the same within a millionth of a degree."""
+    lights = config.render.lights
+    return [
+        (f"render.lights.{i}", f"the same light as render.lights.{j}")
+        for i in range(len(lights))
+        for j in range(i)
+        if lights[i].same_as(lights[j])
     ]
 
 
@@ -428,6 +458,10 @@ def _fault(error: Any) -> tuple[str, str]:
         return key, "unknown key (see the README's config reference)"
     if error["type"] == "missing":
         return key, "required, but missing"
+    if error["type"] == "model_type":
+        return key, f"expected a section (a table of keys), got {_shortened(error['input'])}"
+    if error["type"].startswith("union_tag"):
+        return key, f"expected a kind, one of {', '.join(_KINDS)}, got {_shortened(error['input'])}"
     message = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "value_error":
         return key, message
@@ -440,7 +474,6 @@ def _shortened(value: Any) -> str:
 
 
 def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:
-    kinds = {"mirror", "tilted_mirror", "sinusoid", "rectangular", "blazed", "cd", "gaussian", "elaphe"}
-    types = {"float", "str", "int", "LaserLine", "xenopeltis"} | kinds
+    types = {"float", "str", "int", "LaserLine", *_KINDS}
     shapes = ("tuple[", "literal[", "constrained-", "function-")
     return loc.index(part) > 0 and (part in types or part.startswith(shapes))

@@ -18,6 +18,7 @@ from pipeline.stages.validate import VALIDATE
 from pipeline.store import Artifact, Store
 
 STAGES = (SURFACE, STACK, TABLE, RENDER, VALIDATE)
+UNCHANGED = "nothing it reads has changed"
 _ON_DEVICE = {"table", "validate"}
 
 
@@ -43,7 +44,7 @@ def plan(config: Config, store: Store, until: str = "validate") -> list[Step]:
         cached = store.has(stage.name, key)
         last = _latest(earlier, stage.name, config.name)
         made = {step.stage.name for step in steps if not step.cached}
-        reason = "nothing it reads has changed" if cached else _reason(stage, config, made, last)
+        reason = UNCHANGED if cached else _reason(stage, config, made, last)
         steps.append(Step(stage, key, cached, reason, _cost(stage, config, last)))
     return steps
 

@@ -1,10 +1,15 @@
 """Folders being written, named after their writer: a killed run's leavings are told from work in progress."""
 
+import contextlib
 import os
 import platform
+import shutil
 import time
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
+
+_REPLACING = ".writing-"
 
 _FOREIGN_ABANDONED_AFTER_S = 24 * 3600.0
 
@@ -28,6 +33,27 @@ def abandoned(folder: Path, prefix: str = "") -> bool:
         return time.time() - folder.stat().st_mtime > _FOREIGN_ABANDONED_AFTER_S
     except FileNotFoundError:
         return False
+
+
+def remove_abandoned(parent: Path, prefix: str) -> None:
+    """What killed runs left under `parent`."""
+    for folder in parent.glob(f"{prefix}*"):
+        if abandoned(folder, prefix):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """A scratch folder whose files take their places in `folder`, each by one rename, when it is left unharmed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    remove_abandoned(folder, _REPLACING)
+    scratch = make(folder, _REPLACING)
+    try:
+        yield scratch
+        for file in sorted(scratch.iterdir()):
+            file.replace(folder / file.name)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _alive(pid: int) -> bool:

@@ -9,6 +9,7 @@ from math import exp, pi
 import numpy as np
 from scipy.special import jv
 
+from pipeline.config import LARGEST_TOLERANCE
 from pipeline.errors import AccuracyError
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
@@ -59,21 +60,23 @@ def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, or
     chosen = order if order is not None else _taylor_order(z, 0.2 * tolerance)
     plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
     if plan.error > tolerance:
-        raise AccuracyError(_refusal(plan, field, tolerance))
+        raise AccuracyError(_refusal(plan, field, tolerance, order is not None))
     return plan
 
 
-def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float) -> str:
+def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float, order_was_given: bool) -> str:
     text = (
         f"Taylor tables of order N = {plan.order} would err by {plan.error:.1e} of |P|^2 "
         f"(terms left out {2 * plan.truncation:.1e}, float32 rounding {plan.rounding:.1e}), "
         f"but table.tolerance asks for {tolerance:.1e}; heights span {2 * field.half_range_um:.3g} um. "
     )
-    if 2.0 * plan.truncation <= 0.5 * tolerance:
-        remedy = "Raise table.tolerance, or cut outliers of the heights with surface.clip_percentile"
-    else:
-        remedy = 'Set table.terms = "auto" or a higher number'
-    return text + remedy + "."
+    if order_was_given and 2.0 * plan.truncation > 0.5 * tolerance:
+        return text + 'Set table.terms = "auto", or a higher number.'
+    # half as much again: the truncation's share of the budget grows with it
+    enough = 1.5 * plan.rounding
+    if enough <= LARGEST_TOLERANCE:
+        return text + f"Set table.tolerance = {enough:.0e}, or lower the heights (a scan's: surface.clip_percentile)."
+    return text + "Lower the heights (a scan's outliers: surface.clip_percentile); no tolerance helps."
 
 
 def _taylor_order(z: float, tolerance: float) -> int:

@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 from pipeline.errors import AccuracyError
 from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
@@ -21,6 +22,8 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
 Basis = Literal["taylor", "chebyshev"]
+# 1e-12 of the window's sum is lost to the gaps between samples
+LEAST_SIGMA_PITCHES = 1.2
 _MOST_BYTES = 6 * 2**30
 
 
@@ -63,8 +66,9 @@ def build(
 ) -> Stack:
     """The stack of `terms` terms for |f| <= `frequency_max_per_um` and the band, window cut at `tolerance`.
 
-    Raises AccuracyError where it would not fit into memory.
+    Raises AccuracyError where it would not fit into memory, or the samples do not resolve the window.
     """
+    _check_window(sigma_um, field.pitch_um)
     # centred after the crop: what is left may lie off the whole patch's mid-range
     field = crop_to_window(field, sigma_um).centred()
     width, height = field.size_um
@@ -88,11 +92,21 @@ def build(
     return Stack(basis, coefficients, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
 
 
+def _check_window(sigma_um: float, pitch_um: tuple[float, float]) -> None:
+    """The samples must resolve the window, or their sum is not its integral: 2 exp(-2 pi^2 (sigma / pitch)^2)."""
+    if sigma_um < LEAST_SIGMA_PITCHES * max(pitch_um):
+        raise AccuracyError(
+            f"coherence.sigma_um = {sigma_um:g} is finer than the scan resolves: expected at least "
+            f"{LEAST_SIGMA_PITCHES} pitches, {LEAST_SIGMA_PITCHES * max(pitch_um):.3g} um"
+        )
+
+
 def crop_to_window(field: HeightField, sigma_um: float) -> HeightField:
     """The middle of the patch that the window sees: beyond 8.5 sigma its weight is below float64's rounding."""
     ny, nx = field.shape
+    # a little more where that makes the transform's length a product of small primes
     keep_x, keep_y = (
-        min(n, 2 * int(np.ceil(BLIND_SIGMAS * sigma_um / pitch)) + 2)
+        min(n, next_fast_len(2 * int(np.ceil(BLIND_SIGMAS * sigma_um / pitch)) + 2, real=True))
         for n, pitch in ((nx, field.pitch_um[0]), (ny, field.pitch_um[1]))
     )
     # sample n // 2 stays the middle one

@@ -13,6 +13,7 @@ import contextlib
 import errno
 import json
 import os
+import re
 import shutil
 import time
 from collections.abc import Iterator
@@ -27,6 +28,20 @@ from pipeline.errors import DamagedError, StorageError
 
 RECORD = "artifact.json"
 FORMAT = 1
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_REFUSALS = (
+    errno.EACCES,
+    errno.EPERM,
+    errno.EROFS,
+    errno.ENOENT,
+    errno.ENOTDIR,
+    errno.EISDIR,
+    errno.EEXIST,
+    errno.ENAMETOOLONG,
+    errno.ELOOP,
+    errno.EIO,
+)
+_KEY = re.compile("[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -101,9 +116,11 @@ class Store:
         with writing(self.root):
             folder = scratch.make(self.root / "tmp")
         try:
-            with writing(self.root):
-                whole = {"format": FORMAT, "stage": stage, "key": key, **record}
+            whole = {"format": FORMAT, "stage": stage, "key": key, **record}
+            # a stage also reads: of its faults only a full disk is certainly ours
+            with _space_on(self.root):
                 yield folder, whole
+            with writing(self.root):
                 _seal(folder, whole)
                 self._move(folder, self.folder(stage, key))
         finally:
@@ -121,15 +138,19 @@ class Store:
     def artifacts(self) -> list[Artifact]:
         """All artifacts whose record can be read, by stage and key."""
         found = []
-        for record in sorted(self.root.glob(f"*/*/{RECORD}")):
+        for folder in self._folders():
             with contextlib.suppress(DamagedError):
-                found.append(self._read(record.parent))
+                found.append(self._read(folder))
         return found
+
+    def _folders(self) -> list[Path]:
+        """Every folder that is named as an artifact's: nothing else under the root is ours to judge or remove."""
+        return sorted(p for p in self.root.glob("*/*") if _KEY.fullmatch(p.name) and p.is_dir())
 
     def check(self) -> list[str]:
         """One line for every artifact that is not what it was when it was written."""
         faults = []
-        for folder in sorted(p for p in self.root.glob("*/*") if p.is_dir() and p.parent.name != "tmp"):
+        for folder in self._folders():
             try:
                 artifact = self._read(folder)
                 found = _faults(artifact)
@@ -147,7 +168,7 @@ class Store:
         """
         now = time.time()
         doomed = [p for p in self.root.glob("tmp/*") if scratch.abandoned(p)]
-        for folder in (p for p in self.root.glob("*/*") if p.is_dir() and p.parent.name != "tmp"):
+        for folder in self._folders():
             try:
                 damaged = bool(_faults(self._read(folder)))
             except DamagedError:
@@ -213,10 +234,20 @@ def _damage(folder: Path, faults: list[str]) -> str:
 def writing(place: Path) -> Iterator[None]:
     """Turns the system's refusals to write under `place` into one StorageError."""
     try:
+        with _space_on(place):
+            yield
+    except OSError as error:
+        if error.errno in _REFUSALS:
+            raise StorageError(f"{place}: cannot be written ({os.strerror(error.errno)}); choose another") from None
+        raise
+
+
+@contextlib.contextmanager
+def _space_on(place: Path) -> Iterator[None]:
+    """Turns a full disk into a StorageError."""
+    try:
         yield
     except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        if error.errno in FULL:
             raise StorageError(f"{place}: no space left to write; free some, or choose another place") from None
-        if error.errno in (errno.EACCES, errno.EROFS, errno.EPERM, errno.ENOTDIR):
-            raise StorageError(f"{place}: cannot be written ({os.strerror(error.errno)}); choose another") from None
         raise

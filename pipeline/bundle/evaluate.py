@@ -121,7 +121,7 @@ if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit("usage: python evaluate.py directions.csv")
     try:
-        angles = read_directions(Path(sys.argv[1]).read_text(encoding="utf-8"))
+        angles = read_directions(Path(sys.argv[1]).read_text(encoding="utf-8-sig"))
         found = Bundle(Path(__file__).parent).xyz(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
     except (OSError, ValueError) as error:
         sys.exit(f"{sys.argv[1]}: {error}")

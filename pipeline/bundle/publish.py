@@ -39,7 +39,7 @@ def publish(config: Config, inputs: Mapping[str, Artifact], out: Path, progress:
     """
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
-        _remove_abandoned(out)
+        scratch.remove_abandoned(out, _BESIDE)
         folder = scratch.make(out, _BESIDE)
         try:
             _write(config, inputs, folder, progress)
@@ -52,25 +52,30 @@ def publish(config: Config, inputs: Mapping[str, Artifact], out: Path, progress:
     return target
 
 
-def _remove_abandoned(out: Path) -> None:
-    """What killed publications left."""
-    for folder in out.glob(f"{_BESIDE}*"):
-        if scratch.abandoned(folder, _BESIDE):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
 def published(config: Config, keys: Mapping[str, str], out: Path) -> Path | None:
-    """The bundle under `out` that was published from artifacts of these keys by this config, if it stands."""
+    """The bundle under `out` that was published from artifacts of these keys by this config, if it stands.
+
+    Raises DamagedError where it stands and is not what it was.
+    """
     expected = {"config": sections.resolved_config(config), "artifacts": {n: keys[n] for n in sections.STAGES}}
     for page in sorted(out.glob(f"{config.name}-{config.publish.version}+*/{MANIFEST}")):
         try:
-            found = json.loads(page.read_text(encoding="utf-8"))
-            sealed = checksums.of_sums(page.parent)
-        except (OSError, ValueError):
+            found = json.loads(page.read_text(encoding="utf-8"))["provenance"]
+        except (OSError, ValueError, KeyError, TypeError):
             continue
-        if found.get("provenance") == expected and page.parent.name.endswith(f"+{sealed}"):
+        if found == expected:
+            _require_unharmed(page.parent)
             return page.parent
     return None
+
+
+def _require_unharmed(bundle: Path) -> None:
+    faults = verify(bundle)
+    if faults:
+        raise DamagedError(
+            f"{bundle}: this content was published before, and the folder is not what it was: "
+            f"{summary(faults)}. Move it away and publish again"
+        )
 
 
 def _place(folder: Path, target: Path) -> None:
@@ -84,12 +89,7 @@ def _place(folder: Path, target: Path) -> None:
         # somebody else published the same content meanwhile
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-    faults = verify(target)
-    if faults:
-        raise DamagedError(
-            f"{target}: this content was published before, and the folder is not what it was: "
-            f"{summary(faults)}. Move it away and publish again"
-        )
+    _require_unharmed(target)
 
 
 def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:

@@ -32,7 +32,7 @@ def reflectance(cos_theta: ArrayLike, index: ArrayLike) -> Array:
 def metal_index(metal: str, lambda_nm: Array) -> NDArray[np.complex128]:
     """n + ik at wavelengths, linear between the samples of "Au" or of a CSV of lambda_nm,n,k.
 
-    Raises ScanError for a CSV that is not three ascending columns covering the wavelengths.
+    Raises ScanError for a CSV that is not three ascending columns covering the wavelengths, or no metal's.
     """
     source = files("pipeline.optics").joinpath("gold_johnson_christy_1972.csv") if metal == "Au" else Path(metal)
     table = read_columns(source.read_bytes(), 3, metal)
@@ -40,6 +40,8 @@ def metal_index(metal: str, lambda_nm: Array) -> NDArray[np.complex128]:
     if lambda_nm.min() < low or lambda_nm.max() > high:
         asked = f"{lambda_nm.min():g}..{lambda_nm.max():g}"
         raise ScanError(f"{metal}: has indices for {low:g}..{high:g} nm, but {asked} nm are needed")
+    if np.any(table[:, 1] <= 0) or np.any(table[:, 2] < 0) or np.any(np.hypot(table[:, 1] - 1, table[:, 2]) < 1e-6):
+        raise ScanError(f"{metal}: expected n > 0 and k >= 0, and not n = 1 with k = 0, which reflects nothing")
     n, k = (np.interp(lambda_nm, table[:, 0], table[:, column]) for column in (1, 2))
     return np.asarray(n + 1j * k)
 

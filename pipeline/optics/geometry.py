@@ -34,6 +34,7 @@ def obliquity(wi: Array, wr: Array) -> Array:
 
 def v_cavity(wi: Array, wr: Array) -> Array:
     """Masking and shadowing of symmetric V grooves, Cook & Torrance 1982."""
-    half_z = (wi[..., 2] + wr[..., 2]) / (2.0 * cos_half(wi, wr))
-    shared = 2.0 * half_z / cos_half(wi, wr)
+    # light and view grazing from the same side meet no half vector: the limit is dark
+    cosine = np.maximum(cos_half(wi, wr), np.finfo(float).tiny ** 0.25)
+    shared = (wi[..., 2] + wr[..., 2]) / cosine**2
     return np.asarray(np.minimum(1.0, shared * np.minimum(wi[..., 2], wr[..., 2])))

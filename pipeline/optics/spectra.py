@@ -70,8 +70,11 @@ def illuminant_at(name: str, lambda_nm: Array) -> Array:
     _require_covered(name, nodes, lambda_nm)
     values = np.interp(lambda_nm, nodes, power)
     if np.any(values < 0) or not np.any(values > 0):
-        raise ScanError(f"{name}: expected spectral power >= 0 and somewhere above it")
-    return np.asarray(values)
+        raise ScanError(
+            f"{name}: expected spectral power >= 0, and above 0 at some of the {len(lambda_nm)} wavelengths of the "
+            "integral; for a line use { lambda_nm = ... }"
+        )
+    return np.asarray(values / values.max())
 
 
 def observer_at(name: str, lambda_nm: Array) -> Array:

@@ -49,21 +49,20 @@ def _axes_of_map(axes: Any, title: str) -> None:
     axes.set_yticks([-1, 0, 1])
 
 
-def map_comparison(check: MapCheck, show_ru: float, error_ru: float, title: str) -> bytes:
-    """One light's map: reference, table, and the CIELAB error between them."""
+def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
+    """One light's map: reference, table, and the CIELAB error between them. `light` names it."""
     figure = Figure(figsize=(11.0, 3.7), layout="constrained")
     panels = figure.subplots(1, 3)
     extent = (-1, 1, -1, 1)
     for axes, image, name in zip(panels, (check.reference, check.table), ("reference", "table"), strict=False):
         axes.imshow(pixels(image, show_ru), extent=extent)
-        _axes_of_map(axes, f"{name}, {show_ru:g} RU")
+        _axes_of_map(axes, f"{name}, {light}, {show_ru:g} RU")
     error = np.where(check.views.inside, check.delta_e_image(error_ru), np.nan)
     shown = panels[2].imshow(
         error, extent=extent, cmap="magma", vmin=0.0, vmax=max(1e-3, np.nanpercentile(error, 99.5))
     )
     _axes_of_map(panels[2], f"CIELAB error, {error_ru:g} RU")
     figure.colorbar(shown, ax=panels[2], label="ΔE*ab (1976)")
-    figure.suptitle(title)
     return _png(figure)
 
 

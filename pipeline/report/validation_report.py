@@ -1,6 +1,6 @@
 """The validation report: what was baked, how it looks, and how far it is from the truth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from pipeline.config import Config
@@ -10,14 +10,16 @@ from pipeline.store import Artifact
 Rows = list[list[str]]
 
 
-def _colour_rows(label: str, errors: Sequence[dict[str, float]]) -> Rows:
-    """Rows of a table of CIELAB errors, one an exposure."""
+ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max")
+
+
+def error_rows(results: dict[str, Any]) -> Rows:
+    """CIELAB errors of the validate stage's summary, one row a place and exposure."""
+    places = [(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"]) for m in results["maps"]]
+    places.append(("random directions", results["random"]["colour"]))
     return [
-        [
-            label,
-            f"{e['exposure_ru']:g}",
-            *(f"{e[k]:.3f}" for k in ("mean", "percentile_99", "maximum")),
-        ]
+        [place, f"{e['exposure_ru']:g}", *(f"{e[key]:.3f}" for key in ("mean", "percentile_99", "maximum"))]
+        for place, errors in places
         for e in errors
     ]
 
@@ -107,13 +109,7 @@ def _add_errors(page: Page, results: dict[str, Any]) -> None:
         "The reference integrates every nanometre, without Taylor series, table or interpolation. Colour error is "
         "CIELAB ΔE*ab of the colours a screen shows at each exposure.",
     )
-    rows = [
-        row
-        for m in results["maps"]
-        for row in _colour_rows(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"])
-    ]
-    rows += _colour_rows("random directions", results["random"]["colour"])
-    page.table(["where", "exposure (RU)", "mean", "99th %", "max"], rows)
+    page.table(ERROR_COLUMNS, error_rows(results))
     kinds = [
         ("table on random directions", results["random"]["power"]),
         ("reference against sums over samples", results["reference"]),

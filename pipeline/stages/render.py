@@ -31,7 +31,7 @@ def light_direction(light: Direction) -> Array:
 
 def map_name(light: Direction) -> str:
     """The stem of a map's files: its light's angles in degrees."""
-    return f"map_theta{light.theta_deg:g}_phi{light.phi_deg:g}"
+    return f"map_theta{light.theta_deg:.12g}_phi{light.phi_deg:.12g}"
 
 
 def map_radius(config: Config) -> float:

@@ -19,10 +19,12 @@ from pipeline.surface.statistics import SurfaceStatistics, measure
 _FILE = "surface.zarr"
 # less than this share of the frequencies a view can reach, and the bake would show next to nothing
 _LEAST_KNOWN = 0.05
+# pitches that differ by more are no rounding of square pixels
+_SQUARE = 0.01
 
 
 def _parameters(config: Config) -> dict[str, Any]:
-    section = config.surface.model_dump(mode="json")
+    section = {**config.surface.model_dump(mode="json"), "level": config.surface.levelling}
     if config.surface.path is not None:
         section["path"] = {"sha256": digest.of_file(Path(config.surface.path))}
     # the statistics compare the surface with the window and the wavelengths
@@ -61,11 +63,11 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
         "scan": scan,
         "conditioning": asdict(cleaning),
         "statistics": asdict(statistics),
-        "warnings": _warnings(statistics, config.coherence.sigma_um, lambda_min),
+        "warnings": _warnings(statistics, config.coherence.sigma_um, lambda_min, is_scan=scan is not None),
     }
 
 
-def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: float) -> list[str]:
+def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: float, *, is_scan: bool) -> list[str]:
     """What a user should know before trusting the bake. Raises ScanError for a hopelessly coarse pitch."""
     found = []
     known = statistics.reach_covered
@@ -80,6 +82,12 @@ def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: flo
         found.append(
             f"the pitch of {pitch:g} um is too coarse for {lambda_min_nm:g} nm: {100 * (1 - known):.1f} % of the "
             f"frequencies that a view can reach are unknown and taken as dark ({finest:.3f} um would know all)"
+        )
+    x, y = statistics.pitch_um
+    if is_scan and abs(x / y - 1.0) > _SQUARE:
+        found.append(
+            f"the pitch differs along x and y ({x:.4g} x {y:.4g} um): right for a scan of fewer lines, wrong for one "
+            "that was cut without its size"
         )
     if min(statistics.windows) < 3.99:
         found.append(

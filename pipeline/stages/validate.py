@@ -6,6 +6,7 @@ from typing import Any
 
 from pipeline import validation
 from pipeline.config import Config
+from pipeline.device_stack import kernel_digest
 from pipeline.evaluate import table_evaluator
 from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
@@ -18,6 +19,7 @@ REPORT = "report.html"
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
+        "kernel": kernel_digest("power_spectrum.cl"),
         "name": config.name,
         "material": material_parameters(config),
         "spectrum": spectrum_parameters(config),
@@ -52,8 +54,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     exposures = config.render.exposure_ru, config.accuracy.exposure_ru
     pictures = {"surface": plots.height_map(field), "convergence": plots.convergence(curves, exposures[1])}
     for light, check in zip(lights, checks, strict=True):
-        title = f"light from θ = {light.theta_deg:g}°, φ = {light.phi_deg:g}°"
-        pictures[f"comparison_{render.map_name(light)}"] = plots.map_comparison(check, *exposures, title)
+        named = f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
+        pictures[f"comparison_{render.map_name(light)}"] = plots.map_comparison(check, *exposures, named)
     for name, png in pictures.items():
         (folder / f"{name}.png").write_bytes(png)
     (folder / REPORT).write_text(validation_report.build(config, inputs, results, pictures), encoding="utf-8")

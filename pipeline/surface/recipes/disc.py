@@ -5,10 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline.config import CompactDisc
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.recipes.patch import Axis, generator, lay_out, refusal
-
-SHORTEST_RUN = 3
-LONGEST_RUN = 11
+from pipeline.surface.recipes.patch import LONGEST_RUN, SHORTEST_RUN, Axis, generator, patch_of
 
 
 def compact_disc(recipe: CompactDisc) -> HeightField:
@@ -18,22 +15,12 @@ def compact_disc(recipe: CompactDisc) -> HeightField:
     holds the mean height of its own pixel, so pit edges between samples keep their place and the pits' area
     is exact. Runs are uniform over 3..11 bits, independent from track to track.
     """
-    _check(recipe)
-    patch = lay_out(recipe, period_x_um=recipe.bit_um, period_y_um=recipe.track_um)
-    if patch.x.periods < 2 * SHORTEST_RUN:
-        need = 2 * SHORTEST_RUN * recipe.bit_um
-        raise refusal(recipe, "size_um", f"expected at least 6 bits ({need:g} um) along x")
+    patch = patch_of(recipe)
     rng = generator(recipe.seed)
     pits = np.stack([_track_bits(rng, patch.x.periods) for _ in range(patch.y.periods)])
     along = _coverage_along(pits, patch.x)
     across = _coverage_across(patch.y, recipe.pit_width_um)
     return HeightField(-recipe.depth_um * (across @ along), patch.pitch_um)
-
-
-def _check(recipe: CompactDisc) -> None:
-    if recipe.pit_width_um > recipe.track_um:
-        text = f"expected at most track_um = {recipe.track_um:g} um, got {recipe.pit_width_um:g} um"
-        raise refusal(recipe, "pit_width_um", text)
 
 
 def draw_runs(rng: np.random.Generator, bits: int) -> NDArray[np.int64]:

@@ -6,14 +6,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config import Blazed, Mirror, RecipeBase, Rectangular, Sinusoid, TiltedMirror
+from pipeline.config import Blazed, Mirror, Rectangular, Sinusoid, TiltedMirror
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.recipes.patch import Axis, Patch, lay_out
+from pipeline.surface.recipes.patch import Axis, Patch, patch_of
 
 
 def mirror(recipe: Mirror | TiltedMirror) -> HeightField:
     """h = x tan(tilt_x) + y tan(tilt_y), um: zero at the centre, rising along the axes for positive tilts."""
-    patch = lay_out(recipe)
+    patch = patch_of(recipe)
     field = HeightField(np.zeros(patch.shape), patch.pitch_um)
     if isinstance(recipe, Mirror):
         return field
@@ -24,7 +24,7 @@ def mirror(recipe: Mirror | TiltedMirror) -> HeightField:
 
 def sinusoid(recipe: Sinusoid) -> HeightField:
     """h = a cos(2 pi x / period), um, with a crest at x = 0."""
-    patch, axis = _grating(recipe, recipe.period_um, recipe.axis)
+    patch, axis = _grating(recipe)
     return _extrude(recipe.amplitude_um * np.cos(2 * np.pi * axis.phase()), patch, recipe.axis)
 
 
@@ -36,7 +36,7 @@ def rectangular(recipe: Rectangular) -> HeightField:
     only the two heights; otherwise one sample a period lies between them, and exp(i k w h) is off the
     closed form by at most 2 / (samples per period).
     """
-    patch, axis = _grating(recipe, recipe.period_um, recipe.axis)
+    patch, axis = _grating(recipe)
     begin = axis.phase()
     width = axis.periods / axis.samples
     # raised length below phase p is whole periods * duty + min(p mod 1, duty)
@@ -54,17 +54,14 @@ def blazed(recipe: Blazed) -> HeightField:
     makes the mean exactly height / 2 and leaves sums of exp(i k w h) exp(2 pi i m x / period) off the
     continuous integral by O(1 / M^2) only; M is the number of samples a period where that is whole.
     """
-    patch, axis = _grating(recipe, recipe.period_um, recipe.axis)
+    patch, axis = _grating(recipe)
     return _extrude(recipe.height_um * (axis.phase() + 0.5 * axis.phase_step), patch, recipe.axis)
 
 
-def _grating(recipe: RecipeBase, period_um: float, along: Literal["x", "y"]) -> tuple[Patch, Axis]:
+def _grating(recipe: Sinusoid | Rectangular | Blazed) -> tuple[Patch, Axis]:
     """The patch of a grating and its axis of variation."""
-    if along == "x":
-        patch = lay_out(recipe, period_x_um=period_um)
-        return patch, patch.x
-    patch = lay_out(recipe, period_y_um=period_um)
-    return patch, patch.y
+    patch = patch_of(recipe)
+    return patch, patch.x if recipe.axis == "x" else patch.y
 
 
 def _extrude(profile_um: NDArray[np.float64], patch: Patch, along: Literal["x", "y"]) -> HeightField:

@@ -2,15 +2,32 @@
 
 from dataclasses import dataclass
 from math import gcd
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config import RecipeBase, as_pair
+from pipeline.config import (
+    Blazed,
+    CompactDisc,
+    Elaphe,
+    GaussianRandom,
+    Mirror,
+    Recipe,
+    RecipeBase,
+    Rectangular,
+    Sinusoid,
+    TiltedMirror,
+    Xenopeltis,
+    as_pair,
+)
 from pipeline.errors import ConfigError
 
 # 8 GiB a field: past this a size or a pitch is in the wrong unit
 _MOST_SAMPLES = 2**30
+# of a compact disc, in channel bits
+SHORTEST_RUN = 3
+LONGEST_RUN = 11
 
 
 @dataclass(frozen=True)
@@ -66,7 +83,52 @@ class Patch:
         return self.x.pitch_um, self.y.pitch_um
 
 
-def lay_out(recipe: RecipeBase, period_x_um: float | None = None, period_y_um: float | None = None) -> Patch:
+def patch_of(recipe: Recipe) -> Patch:
+    """The patch a recipe asks for, as cheap as a look: nothing is made yet.
+
+    Raises ConfigError where the patch cannot carry the structure asked for.
+    """
+    match recipe:
+        case Sinusoid() | Rectangular() | Blazed():
+            along_x = recipe.axis == "x"
+            return _lay_out(recipe, *((recipe.period_um, None) if along_x else (None, recipe.period_um)))
+        case CompactDisc():
+            return _disc_patch(recipe)
+        case GaussianRandom():
+            return _gaussian_patch(recipe)
+        case Elaphe():
+            return _lay_out(recipe, period_x_um=recipe.across_um)
+        case Xenopeltis():
+            return _lay_out(recipe, recipe.across_um, recipe.along_um)
+        case Mirror() | TiltedMirror():
+            return _lay_out(recipe)
+        case _:
+            assert_never(recipe)
+
+
+def _disc_patch(recipe: CompactDisc) -> Patch:
+    """Whole bits along x, at least one pit and one land, and whole tracks along y."""
+    if recipe.pit_width_um > recipe.track_um:
+        text = f"expected at most track_um = {recipe.track_um:g} um, got {recipe.pit_width_um:g} um"
+        raise refusal(recipe, "pit_width_um", text)
+    patch = _lay_out(recipe, period_x_um=recipe.bit_um, period_y_um=recipe.track_um)
+    if patch.x.periods < 2 * SHORTEST_RUN:
+        need = 2 * SHORTEST_RUN * recipe.bit_um
+        raise refusal(recipe, "size_um", f"expected at least {2 * SHORTEST_RUN} bits ({need:g} um) along x")
+    return patch
+
+
+def _gaussian_patch(recipe: GaussianRandom) -> Patch:
+    """Samples finer than half a correlation length, and a patch longer than one."""
+    patch = _lay_out(recipe)
+    for name, length, axis in zip("xy", as_pair(recipe.correlation_um), (patch.x, patch.y), strict=True):
+        if not 2 * axis.pitch_um <= length <= axis.size_um:
+            span = f"{2 * axis.pitch_um:g} to {axis.size_um:g} um (two samples to the whole patch)"
+            raise refusal(recipe, "correlation_um", f"expected {span} along {name}, got {length:g} um")
+    return patch
+
+
+def _lay_out(recipe: RecipeBase, period_x_um: float | None = None, period_y_um: float | None = None) -> Patch:
     """The patch nearest to the recipe's `size_um` and `pitch_um` that holds whole periods (at least one).
 
     An axis without a period keeps its size. Raises ConfigError where a period falls below two samples,

@@ -6,7 +6,7 @@ from scipy import fft
 
 from pipeline.config import GaussianRandom, as_pair
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.recipes.patch import Axis, generator, lay_out, refusal
+from pipeline.surface.recipes.patch import Axis, generator, patch_of
 
 
 def gaussian(recipe: GaussianRandom) -> HeightField:
@@ -15,11 +15,7 @@ def gaussian(recipe: GaussianRandom) -> HeightField:
     Its autocorrelation is sigma^2 exp(-x^2/lx^2 - y^2/ly^2) in the mean over seeds. Raises ConfigError where
     the pitch is above half a correlation length or the patch is shorter than one.
     """
-    patch = lay_out(recipe)
-    for name, length, axis in zip("xy", as_pair(recipe.correlation_um), (patch.x, patch.y), strict=True):
-        if not 2 * axis.pitch_um <= length <= axis.size_um:
-            span = f"{2 * axis.pitch_um:g} to {axis.size_um:g} um (two samples to the whole patch)"
-            raise refusal(recipe, "correlation_um", f"expected {span} along {name}, got {length:g} um")
+    patch = patch_of(recipe)
     noise = smooth_noise(generator(recipe.seed), patch.y, patch.x, as_pair(recipe.correlation_um))
     return HeightField(recipe.sigma_h_um * noise, patch.pitch_um)
 

@@ -10,7 +10,7 @@ from scipy import fft
 
 from pipeline.config import Elaphe, Xenopeltis
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.recipes.patch import Axis, Patch, generator, lay_out
+from pipeline.surface.recipes.patch import Axis, Patch, generator, patch_of
 from pipeline.surface.recipes.random import lowpass, smooth_noise
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ def elaphe(recipe: Elaphe) -> HeightField:
     Whole periods along x. Columns place their fingers (about 2.95 um long) by phases that drift along and
     across the skin, so that there is no firm period along y. Peak to valley is exactly `height_um`.
     """
-    patch = lay_out(recipe, period_x_um=recipe.across_um)
+    patch = patch_of(recipe)
     rng = generator(recipe.seed)
     across = _lattice(patch.x) + 0.12 * smooth_noise(rng, patch.y, patch.x, (3.0, 14.0))
     fingers = max(1, round(patch.y.size_um / _ELAPHE_FINGER_UM))
@@ -65,7 +65,7 @@ def xenopeltis(recipe: Xenopeltis) -> HeightField:
     Whole periods along both axes. Each finger rises towards +y and drops at its tip, so that the profile
     along y is a sawtooth. Peak to valley is exactly `height_um`.
     """
-    patch = lay_out(recipe, recipe.across_um, recipe.along_um)
+    patch = patch_of(recipe)
     rng = generator(recipe.seed)
     rows, fingers = patch.y.periods, patch.x.periods
     along = _lattice(patch.y)[:, None] + 0.45 * smooth_noise(rng, patch.y, patch.x, (5.0, 12.0))

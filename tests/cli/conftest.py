@@ -1,0 +1,38 @@
+"""Tools in folders of their own; one small bake shared by all that only read it."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.tool import Result, Tool
+
+
+@pytest.fixture
+def tool(tmp_path: Path) -> Tool:
+    """An empty folder, an empty store."""
+    return Tool(tmp_path, tmp_path / "store")
+
+
+@pytest.fixture(scope="session")
+def first_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Tool, Result]:
+    """The small config's first run, in this process, and what it printed."""
+    folder = tmp_path_factory.mktemp("baked")
+    tool = Tool(folder, folder / "store")
+    result = tool("run", tool.config())
+    assert result.code == 0, result.stderr
+    return tool, result
+
+
+@pytest.fixture(scope="session")
+def baked(first_run: tuple[Tool, Result]) -> Tool:
+    """The folder of the small config after its first run: read it, change nothing."""
+    return first_run[0]
+
+
+@pytest.fixture
+def copy(baked: Tool, tmp_path: Path) -> Tool:
+    """A copy of `baked` to change at will."""
+    folder = tmp_path / "copy"
+    shutil.copytree(baked.folder, folder)
+    return Tool(folder, folder / "store")

@@ -1,0 +1,94 @@
+"""`inspect`: scans, configs and bundles; what a config still needs."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.tool import REPOSITORY, Tool
+
+SCAN = REPOSITORY / "configs" / "example_scan.txt"
+
+
+def test_a_scan_with_units(tool: Tool) -> None:
+    found = tool("inspect", SCAN, "--json").json
+    assert found["file"] == "example_scan.txt"
+    assert found["channel"] == "Topography"
+    assert (found["samples"], found["holes"]) == ("160 x 160", 0)
+    assert found["pitch_um"] == [0.1, 0.1]
+    assert found["um_per_unit"] == 1e6
+    assert found["config needs"] == []
+    assert found["lowest"] < found["highest"]
+
+
+def test_text_for_people_tells_the_same(tool: Tool) -> None:
+    result = tool("inspect", SCAN)
+    assert (result.code, result.stderr) == (0, "")
+    told = {line[:16].strip(): line[17:] for line in result.stdout.splitlines()}
+    found = tool("inspect", SCAN, "--json").json
+    assert told == {key: v if isinstance(v, str) else json.dumps(v) for key, v in found.items()}
+
+
+@pytest.mark.parametrize(
+    ("name", "needs"),
+    [
+        ("scan.npy", ["surface.pitch_um", "surface.height_unit"]),
+        ("scan.txt", ["surface.pitch_um", "surface.height_unit"]),
+        ("scan.png", ["surface.pitch_um", "surface.height_range_um"]),
+    ],
+)
+def test_the_keys_it_asks_for_are_the_keys_that_bake(tool: Tool, name: str, needs: list[str]) -> None:
+    heights = 100 + 20 * np.sin(np.arange(100) / 3)[None, :] * np.cos(np.arange(100) / 5)[:, None]
+    path = tool.folder / name
+    if name.endswith("npy"):
+        np.save(path, heights)
+    elif name.endswith("txt"):
+        np.savetxt(path, heights, fmt="%.3f")
+    else:
+        Image.fromarray(np.uint8(heights)).save(path)
+    assert tool("inspect", path, "--json").json["config needs"] == needs
+    values = {"surface.pitch_um": 0.1, "surface.height_unit": "nm", "surface.height_range_um": 0.1}
+    keys = {key.removeprefix("surface."): values[key] for key in needs}
+    config = tool.config(surface={"path": name, **keys})
+    assert tool("render", config, "--exact", "--size", "16").code == 0
+
+
+def test_holes_of_a_scan_without_a_height(tool: Tool) -> None:
+    np.save(tool.folder / "scan.npy", np.full((9, 10), np.nan))
+    found = tool("inspect", "scan.npy", "--json").json
+    assert (found["samples"], found["holes"], found["lowest"]) == ("10 x 9", 90, None)
+
+
+def test_a_config_with_its_defaults(baked: Tool) -> None:
+    found = baked("inspect", "small.toml", "--json").json
+    assert found["table"] == {
+        "layout": "taylor",
+        "resolution": 41,
+        "power": 5.0,
+        "terms": "auto",
+        "step_nm": 5.0,
+        "tolerance": 1e-4,
+    }
+    assert found["publish"]["version"] == "1.0.0"
+    assert baked("inspect", "small.toml").stdout.startswith("name             small\n")
+
+
+def test_a_bundle(baked: Tool) -> None:
+    found = baked("inspect", baked.bundle(), "--json").json
+    assert found == json.loads((baked.bundle() / "manifest.json").read_text(encoding="utf-8"))
+    assert "licence          not stated" in baked("inspect", baked.bundle()).stdout
+
+
+def test_what_cannot_be_inspected(tool: Tool) -> None:
+    assert tool("inspect", "none").code == 2
+    assert tool("inspect", tool.folder).code == 6
+    (tool.folder / "odd.bin").write_bytes(bytes(range(256)))
+    result = tool("inspect", "odd.bin")
+    assert result.code == 3
+    assert len(result.errors) == 1
+    (tool.folder / "odd.toml").write_text("colour = 1", encoding="utf-8")
+    assert tool("inspect", "odd.toml").code == 2
+    result = tool("inspect", SCAN, "--channel", "Phase")
+    assert result.code == 3
+    assert "only 'Topography'" in result.errors[0]

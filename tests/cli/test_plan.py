@@ -1,0 +1,49 @@
+"""`plan`: what run would do, and that it does nothing of it."""
+
+from tests.cli.tool import Tool
+
+STAGES = ["surface", "stack", "table", "render", "validate"]
+
+
+def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> None:
+    result = tool("plan", tool.config())
+    assert result.code == 0
+    assert result.stderr == ""
+    lines = result.stdout.splitlines()
+    assert lines[0] == "small:"
+    assert lines[1].split() == ["stage", "state", "cost", "why"]
+    assert [line.split()[:3] for line in lines[2:]] == [[stage, "to", "do"] for stage in STAGES]
+    assert all(line.endswith("not made before") for line in lines[2:])
+    assert sorted(path.name for path in tool.folder.iterdir()) == ["small.toml"]
+
+
+def test_after_a_run_all_is_cached(baked: Tool) -> None:
+    told = baked("plan", "small.toml", "--json").json
+    assert list(told) == ["small"]
+    assert [step["stage"] for step in told["small"]] == STAGES
+    assert {step["state"] for step in told["small"]} == {"cached"}
+    assert {step["stage"]: [step["key"]] for step in told["small"]} == baked.artifacts()
+    assert all("last time" in step["cost"] for step in told["small"])
+
+
+def test_a_changed_key_is_named_with_both_values_and_what_follows_from_it(copy: Tool) -> None:
+    before = copy.artifacts()
+    steps = {s["stage"]: s for s in copy("plan", copy.config(table={"tolerance": 0.01}), "--json").json["small"]}
+    assert [steps[stage]["state"] for stage in STAGES] == ["cached", *["to do"] * 4]
+    assert steps["stack"]["reason"] == "changed: tolerance 0.0001 -> 0.01"
+    assert steps["table"]["reason"] == "changed: table.tolerance 0.0001 -> 0.01"
+    assert steps["render"]["reason"] == "its input will be made: table"
+    assert steps["validate"]["reason"] == "its input will be made: render, stack, table"
+    assert copy.artifacts() == before
+
+
+def test_a_change_late_in_the_line_leaves_the_early_stages(copy: Tool) -> None:
+    told = copy("plan", copy.config(render={"size": 48}))
+    states = {line.split()[0]: line for line in told.stdout.splitlines()[2:]}
+    assert all("cached" in states[stage] for stage in ("surface", "stack", "table"))
+    assert "changed: render.size 32 -> 48" in states["render"]
+
+
+def test_several_configs(baked: Tool, tool: Tool) -> None:
+    other = tool.config(name="other")
+    assert list(baked("plan", "small.toml", other, "--json").json) == ["small", "other"]

@@ -1,0 +1,80 @@
+"""Every command that README prints works as printed."""
+
+import re
+import shlex
+import shutil
+import subprocess
+
+import pytest
+
+from tests.cli.tool import REPOSITORY, Tool, recipe
+
+README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+# commands stand alone, or first in a line with what they do two spaces further
+_LINE = re.compile(r"^    (?:\.venv/bin/)?diffract-bake (.+?)(?: {2,}.*)?$", re.MULTILINE)
+_ALSO = re.compile(r"also: (store \w+), (store \w+)$", re.MULTILINE)
+COMMANDS = [*_LINE.findall(README), *(command for pair in _ALSO.findall(README) for command in pair)]
+TARGETS = sorted({*re.findall(r"\bmake ([a-z]+)", README)})
+
+
+def test_commands_are_found() -> None:
+    lines = [line for line in README.splitlines() if re.match(r"    \S*diffract-bake ", line)]
+    assert len(lines) + 2 == len(COMMANDS) >= 15
+    from cli.main import _COMMANDS
+
+    assert {command.split()[0] for command in COMMANDS} == set(_COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command(copy: Tool, command: str) -> None:
+    """Placeholders are in capitals and stand for files of one small bake; one that is new fails here."""
+    shutil.copytree(REPOSITORY / "configs", copy.folder / "configs")
+    (copy.folder / "directions.csv").write_text("theta_i,phi_i,theta_r,phi_r\n0,0,13,0\n", encoding="utf-8")
+    files = {
+        "CONFIG...": "small.toml",
+        "CONFIG": "small.toml",
+        "SOURCE": "small.toml",
+        "BUNDLE": str(copy.bundle()),
+        "FILE.csv": "directions.csv",
+    }
+    if command.startswith("bench "):
+        # beside plain numpy in relative digits: a grating has I_p that are nothing
+        files["CONFIG"] = copy.config("rough.toml", surface=recipe("gaussian")).name
+    words = [files.get(word, word) for word in shlex.split(command)]
+    assert not any(re.fullmatch(r"[A-Z]{2,}\S*", word) for word in words), f"unknown placeholder in {command!r}"
+    result = copy(*words)
+    assert result.code == 0, result.stderr
+    assert result.stdout
+
+
+def test_make_targets_exist_and_are_told() -> None:
+    assert {"bake", "test", "bench", "pipeline"} <= set(TARGETS)
+    told = subprocess.run(["make", "-C", str(REPOSITORY)], capture_output=True, text=True, check=True).stdout
+    helped = subprocess.run(["make", "-C", str(REPOSITORY), "help"], capture_output=True, text=True, check=True)
+    assert told == helped.stdout
+    for target in TARGETS:
+        command = ["make", "-C", str(REPOSITORY), "-n", target, "CONFIG=configs/scan.toml"]
+        subprocess.run(command, capture_output=True, check=True)
+        assert f"make {target}" in told
+
+
+def test_exit_codes_are_those_of_the_code() -> None:
+    from pipeline import errors
+
+    table = {int(code) for code in re.findall(r"^\| (\d+) \|", README, re.MULTILINE)}
+    raised = {cls.exit_code for cls in vars(errors).values() if isinstance(cls, type) and hasattr(cls, "exit_code")}
+    assert table == {0, 130} | raised
+
+
+def test_every_config_and_every_key_is_told() -> None:
+    from pipeline.config import Config
+
+    for path in (REPOSITORY / "configs").glob("*.toml"):
+        assert f"`{path.stem}`" in README or f"configs/{path.name}" in README
+    for name, field in Config.model_fields.items():
+        section = field.annotation
+        if name in ("name", "scene"):
+            continue
+        row = next(line for line in README.splitlines() if line.startswith(f"| `[{name}]`"))
+        keys = {*getattr(section, "model_fields", {})} - {"recipe"}
+        assert all(f"`{key}`" in row for key in keys), name

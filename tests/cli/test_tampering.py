@@ -1,0 +1,109 @@
+"""What was changed after it was written is named, never used, and mended by what the message says."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.tool import Tool, flip_a_byte
+
+
+def largest(folder: Path) -> Path:
+    return max((path for path in folder.rglob("*") if path.is_file()), key=lambda path: path.stat().st_size)
+
+
+def artifact(tool: Tool, stage: str) -> Path:
+    (key,) = tool.artifacts()[stage]
+    return tool.store / stage / key
+
+
+def test_a_changed_artifact_is_named_collected_and_made_again(copy: Tool) -> None:
+    table = artifact(copy, "table")
+    harmed = largest(table / "table.zarr")
+    flip_a_byte(harmed)
+    # another size of maps needs the table again
+    config = copy.config(render={"size": 16})
+    result = copy("run", config)
+    assert result.code == 6
+    (line,) = result.errors
+    assert str(table) in line
+    assert f"{harmed.relative_to(table)} was changed" in line
+    assert "`diffract-bake store collect` removes damaged artifacts" in line
+    assert len(copy.artifacts()["render"]) == 1
+
+    checked = copy("store", "check")
+    assert checked.code == 6
+    assert checked.errors == result.errors
+    assert copy("store", "check", "--json").json["faults"] == [line.removeprefix("error: ")]
+
+    collected = copy("store", "collect")
+    assert collected.code == 0
+    assert collected.stdout.startswith("removed 1 folders, ")
+    assert not table.exists()
+    assert copy("store", "check").code == 0
+    assert copy("run", config).code == 0
+    assert table.is_dir()
+
+
+@pytest.mark.parametrize("how", ["changed", "cut", "gone", "added", "other"])
+def test_harm_to_a_record_or_to_the_list_of_files(copy: Tool, how: str) -> None:
+    render = artifact(copy, "render")
+    record = render / "artifact.json"
+    if how == "changed":
+        record.write_text(record.read_text(encoding="utf-8").replace('"size": 32', '"size": 64'), encoding="utf-8")
+    elif how == "cut":
+        record.write_bytes(record.read_bytes()[:100])
+    elif how == "gone":
+        record.unlink()
+    elif how == "added":
+        (render / "more.txt").write_text("more", encoding="utf-8")
+    else:
+        render.rename(render.with_name("0" * 64))
+        assert copy("store", "check").code == 6
+        return
+    result = copy("run", "small.toml")
+    assert result.code == 6
+    assert len(result.errors) == 1
+    assert str(render) in result.errors[0]
+    assert copy("store", "collect").code == 0
+    assert copy("run", "small.toml").code == 0
+
+
+@pytest.mark.parametrize("stage", ["render", "validate"])
+def test_changed_results_are_not_laid_out(copy: Tool, stage: str) -> None:
+    flip_a_byte(largest(artifact(copy, stage)))
+    result = copy("run", "small.toml", "--out", "again")
+    assert result.code == 6
+    assert len(result.errors) == 1
+    assert list((copy.folder / "again").rglob("small-*")) == []
+
+
+@pytest.mark.parametrize(
+    "pattern", ["tables/I_00.exr", "tables/I_05.exr", "manifest.json", "maps/*.png", "SHA256SUMS"]
+)
+def test_a_changed_bundle(copy: Tool, pattern: str) -> None:
+    (harmed,) = copy.bundle().glob(pattern)
+    flip_a_byte(harmed)
+    name = harmed.relative_to(copy.bundle()).as_posix()
+    verified = copy("verify", copy.bundle())
+    assert verified.code == 6
+    assert verified.stdout == ""
+    assert any(name in line for line in verified.errors)
+    assert len(copy("verify", copy.bundle(), "--json").json["faults"]) == len(verified.errors)
+    (copy.folder / "d.csv").write_text("0,0,10,0\n", encoding="utf-8")
+    evaluated = copy("eval", copy.bundle(), "--directions", "d.csv")
+    assert evaluated.code == 6
+    assert evaluated.stdout == ""
+    assert any(name in line for line in evaluated.errors)
+
+
+def test_an_unharmed_bundle(baked: Tool) -> None:
+    result = baked("verify", baked.bundle())
+    assert (result.code, result.stderr) == (0, "")
+    assert result.stdout == f"{baked.bundle()}: unharmed\n"
+    assert baked("verify", baked.bundle(), "--json").json == {"bundle": str(baked.bundle()), "faults": []}
+
+
+def test_a_folder_that_is_no_bundle(tool: Tool) -> None:
+    result = tool("verify", tool.folder)
+    assert result.code == 6
+    assert "SHA256SUMS is missing" in result.errors[0]
