@@ -1,5 +1,6 @@
 """`run`, `validate` and `plan`: what a config needs, and doing it."""
 
+import os
 import shutil
 import time
 from pathlib import Path
@@ -81,12 +82,14 @@ def load_all(paths: tuple[Path, ...]) -> list[Config]:
 
 
 def _require_folders(loaded: list[Config], out: Path) -> None:
-    """Better now than after the work. Raises StorageError."""
-    from pipeline.store import writing
+    """Better told now than after the work, and nothing is made yet. Raises StorageError."""
+    from pipeline.errors import StorageError
 
     for config in loaded:
-        with writing(out / config.name):
-            (out / config.name).mkdir(parents=True, exist_ok=True)
+        folder = out / config.name
+        standing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+        if not (standing.is_dir() and os.access(standing, os.W_OK | os.X_OK)):
+            raise StorageError(f"{folder}: cannot be written, for {standing} is no folder to write in; see --out")
 
 
 def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> dict[str, Any]:

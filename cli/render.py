@@ -46,11 +46,13 @@ def render_command(
     lights = config.render.lights if theta is None else [Direction(theta_deg=theta, phi_deg=phi or 0.0)]
     views = Map(size or config.render.size, render.map_radius(config))
     folder, made = out / config.name, []
-    with console.showing_progress() as progress, writing(folder), scratch.replacing(folder) as beside:
+    with console.showing_progress() as progress:
         evaluate = sources.config_evaluator(config, exact, store_root, progress)
-        for light in lights:
-            image = render_map(evaluate, render.light_direction(light), views)
-            sources.refuse_unreached(image, f"the light {light.theta_deg:g}°, {light.phi_deg:g}°", str(config_path))
+        shown = [render_map(evaluate, render.light_direction(light), views) for light in lights]
+    for light, image in zip(lights, shown, strict=True):
+        sources.refuse_unreached(image, f"the light {light.theta_deg:g}°, {light.phi_deg:g}°", str(config_path))
+    with writing(folder), scratch.replacing(folder) as beside:
+        for light, image in zip(lights, shown, strict=True):
             name = render.map_name(light) + ("_exact" if exact else "")
             images.write_xyz(beside / f"{name}.exr", image)
             images.write_png(beside / f"{name}.png", pixels(image, exposure or config.render.exposure_ru))

@@ -116,11 +116,9 @@ class Store:
         with writing(self.root):
             folder = scratch.make(self.root / "tmp")
         try:
-            whole = {"format": FORMAT, "stage": stage, "key": key, **record}
-            # a stage also reads: of its faults only a full disk is certainly ours
-            with _space_on(self.root):
-                yield folder, whole
             with writing(self.root):
+                whole = {"format": FORMAT, "stage": stage, "key": key, **record}
+                yield folder, whole
                 _seal(folder, whole)
                 self._move(folder, self.folder(stage, key))
         finally:
@@ -232,22 +230,20 @@ def _damage(folder: Path, faults: list[str]) -> str:
 
 @contextlib.contextmanager
 def writing(place: Path) -> Iterator[None]:
-    """Turns the system's refusals to write under `place` into one StorageError."""
-    try:
-        with _space_on(place):
-            yield
-    except OSError as error:
-        if error.errno in _REFUSALS:
-            raise StorageError(f"{place}: cannot be written ({os.strerror(error.errno)}); choose another") from None
-        raise
-
-
-@contextlib.contextmanager
-def _space_on(place: Path) -> Iterator[None]:
-    """Turns a full disk into a StorageError."""
+    """Turns the system's refusals to write under `place` into one StorageError; faults elsewhere stay as they are."""
     try:
         yield
     except OSError as error:
         if error.errno in FULL:
             raise StorageError(f"{place}: no space left to write; free some, or choose another place") from None
+        if error.errno in _REFUSALS and _concerns(error, place):
+            raise StorageError(f"{place}: cannot be written ({os.strerror(error.errno)}); choose another") from None
         raise
+
+
+def _concerns(error: OSError, place: Path) -> bool:
+    """Whether a fault names a path at or below `place`, or above it where that does not stand, or none."""
+    if error.filename is None:
+        return True
+    named = Path(os.fsdecode(error.filename))
+    return named.is_relative_to(place) or place.is_relative_to(named)

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import hashlib
 import json
 import multiprocessing
 import os
@@ -21,6 +22,13 @@ from pipeline import store as store_module
 from pipeline.errors import DamagedError, StorageError
 from pipeline.store import RECORD, Store
 
+
+def key_of(name):
+    """An address as artifacts have them."""
+    return hashlib.sha256(name.encode()).hexdigest()
+
+
+K1, K2 = key_of("k1"), key_of("k2")
 ROOT = Path(__file__).resolve().parents[1]
 RECORDED = {"name": "a", "version": 1, "parameters": {"x": 1.5}, "inputs": {}, "summary": {"found": [1, 2]}}
 
@@ -30,7 +38,7 @@ def store(tmp_path):
     return Store(tmp_path / "store")
 
 
-def make(store, key="k1", stage="surface", text="content"):
+def make(store, key=K1, stage="surface", text="content"):
     """An artifact of two files, one of them in a folder."""
     with store.create(stage, key, RECORDED) as (folder, _):
         (folder / "a.txt").write_text(text)
@@ -49,24 +57,24 @@ def everything(folder):
 
 def test_an_artifact_is_what_was_written(store):
     """Its record, summary and files come back, with its size; nothing temporary is left."""
-    assert not store.has("surface", "k1")
+    assert not store.has("surface", K1)
     make(store)
-    assert store.has("surface", "k1")
-    artifact = store.open("surface", "k1")
-    assert (artifact.stage, artifact.key, artifact.summary) == ("surface", "k1", {"found": [1, 2]})
+    assert store.has("surface", K1)
+    artifact = store.open("surface", K1)
+    assert (artifact.stage, artifact.key, artifact.summary) == ("surface", K1, {"found": [1, 2]})
     assert artifact.record["parameters"] == {"x": 1.5}
     assert (artifact.folder / "a.txt").read_text() == "content"
     assert artifact.bytes == len("content") + 100
-    assert [found.key for found in store.artifacts()] == ["k1"]
+    assert [found.key for found in store.artifacts()] == [K1]
     assert store.check() == []
     assert list((store.root / "tmp").iterdir()) == []
 
 
 def test_the_record_can_be_completed_while_writing(store):
     """What a stage finds out is sealed with the rest."""
-    with store.create("table", "k", {"name": "a"}) as (_, record):
+    with store.create("table", K1, {"name": "a"}) as (_, record):
         record["summary"] = {"terms": 12}
-    assert store.open("table", "k").summary == {"terms": 12}
+    assert store.open("table", K1).summary == {"terms": 12}
 
 
 @pytest.mark.parametrize("fault", [ValueError, KeyboardInterrupt, MemoryError])
@@ -74,27 +82,27 @@ def test_a_fault_while_writing_leaves_nothing(store, fault):
     """Neither an artifact nor a temporary folder is left, and the fault itself is passed on."""
 
     def fail():
-        with store.create("surface", "k1", RECORDED) as (folder, _):
+        with store.create("surface", K1, RECORDED) as (folder, _):
             (folder / "a.txt").write_text("half")
-            assert not store.has("surface", "k1")
+            assert not store.has("surface", K1)
             raise fault
 
     with pytest.raises(fault):
         fail()
-    assert not store.has("surface", "k1")
+    assert not store.has("surface", K1)
     assert everything(store.root) == {store.root / "tmp"}
     make(store)
-    assert store.open("surface", "k1").key == "k1"
+    assert store.open("surface", K1).key == K1
 
 
 def test_nothing_is_visible_before_the_end(store):
     """While an artifact is being written no other reader sees a part of it."""
-    with store.create("surface", "k1", RECORDED) as (folder, _):
+    with store.create("surface", K1, RECORDED) as (folder, _):
         (folder / "a.txt").write_text("half")
-        assert not store.has("surface", "k1")
+        assert not store.has("surface", K1)
         assert store.artifacts() == []
         assert store.check() == []
-    assert store.has("surface", "k1")
+    assert store.has("surface", K1)
 
 
 @pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o755), (0o077, 0o700), (0o002, 0o775)])
@@ -111,24 +119,24 @@ def test_artifacts_are_readable_as_the_umask_says(store, umask, mode):
 
 def test_the_first_of_two_writers_without_a_lock_stays(store):
     """On machines that share no lock both make it; the second finds it made and leaves it alone."""
-    with store.create("surface", "k1", RECORDED) as (folder, _):
+    with store.create("surface", K1, RECORDED) as (folder, _):
         (folder / "a.txt").write_text("second")
         make(store, text="first")
-    assert (store.open("surface", "k1").folder / "a.txt").read_text() == "first"
+    assert (store.open("surface", K1).folder / "a.txt").read_text() == "first"
     assert list((store.root / "tmp").iterdir()) == []
 
 
 def make_once(root, log):
     """What a run does for one step: waits for the lock, makes the artifact unless it stands."""
     store = Store(root)
-    with store.lock("surface", "k1"):
-        if not store.has("surface", "k1"):
-            with store.create("surface", "k1", RECORDED) as (folder, _):
+    with store.lock("surface", K1):
+        if not store.has("surface", K1):
+            with store.create("surface", K1, RECORDED) as (folder, _):
                 time.sleep(0.05)
                 (folder / "a.txt").write_text("content")
             with log.open("a") as stream:
                 stream.write("made\n")
-    store.open("surface", "k1")
+    store.open("surface", K1)
 
 
 def test_threads_make_an_artifact_once(store, tmp_path):
@@ -155,7 +163,7 @@ def test_processes_make_an_artifact_once(store, tmp_path):
 
 def test_locks_of_different_artifacts_do_not_wait(store):
     """One lock is for one artifact."""
-    with store.lock("surface", "k1"), store.lock("surface", "k2"), store.lock("stack", "k1"):
+    with store.lock("surface", K1), store.lock("surface", K2), store.lock("stack", K1):
         pass
 
 
@@ -191,10 +199,10 @@ DAMAGES = {
 def test_damage_is_found_named_and_removed(store, damage, said):
     """Opening refuses a damaged artifact with the file and the remedy; collecting removes it and it alone."""
     folder = make(store)
-    sound = make(store, "k2")
+    sound = make(store, K2)
     damage(folder)
     with pytest.raises(DamagedError) as error:
-        store.open("surface", "k1")
+        store.open("surface", K1)
     assert said in str(error.value)
     assert str(folder) in str(error.value)
     assert "store collect" in str(error.value)
@@ -205,16 +213,16 @@ def test_damage_is_found_named_and_removed(store, damage, said):
     assert sound.is_dir()
     assert store.check() == []
     make(store)
-    assert store.open("surface", "k1").key == "k1"
+    assert store.open("surface", K1).key == K1
 
 
 def test_many_faults_make_one_line(store):
     """Three files are named, the others counted."""
-    with store.create("surface", "k1", RECORDED) as (folder, _):
+    with store.create("surface", K1, RECORDED) as (folder, _):
         for i in range(9):
             (folder / f"{i}.txt").write_text("content")
     for i in range(9):
-        (store.folder("surface", "k1") / f"{i}.txt").unlink()
+        (store.folder("surface", K1) / f"{i}.txt").unlink()
     (line,) = store.check()
     assert "and 6 more" in line
     assert "\n" not in line
@@ -222,20 +230,20 @@ def test_many_faults_make_one_line(store):
 
 def test_an_artifact_under_anothers_key_is_damage(store):
     """A sound folder in the wrong place would give another config's numbers."""
-    shutil.copytree(make(store), store.folder("surface", "k2"))
-    with pytest.raises(DamagedError, match="k1"):
-        store.open("surface", "k2")
-    assert store.open("surface", "k1").key == "k1"
+    shutil.copytree(make(store), store.folder("surface", K2))
+    with pytest.raises(DamagedError, match=K1):
+        store.open("surface", K2)
+    assert store.open("surface", K1).key == K1
 
 
 def test_a_description_reads_the_record_alone(store):
     """Plans look at many artifacts and need no file of theirs; a damaged record is still refused."""
     folder = make(store)
     (folder / "a.txt").write_text("changed")
-    assert store.describe("surface", "k1").summary == {"found": [1, 2]}
+    assert store.describe("surface", K1).summary == {"found": [1, 2]}
     truncate(folder / RECORD)
     with pytest.raises(DamagedError):
-        store.describe("surface", "k1")
+        store.describe("surface", K1)
     assert store.artifacts() == []
 
 
@@ -258,14 +266,14 @@ def test_collect_tells_what_it_freed(store):
 
 def test_collect_keeps_what_was_used_lately(store):
     """Age counts from the last use, and only when a number of days is given."""
-    for key in ("old", "used", "new"):
-        make(store, key)
-    age(store.folder("surface", "old") / RECORD, 40)
-    age(store.folder("surface", "used") / RECORD, 40)
-    store.touch("surface", "used")
+    for name in ("old", "used", "new"):
+        make(store, key_of(name))
+    age(store.folder("surface", key_of("old")) / RECORD, 40)
+    age(store.folder("surface", key_of("used")) / RECORD, 40)
+    store.touch("surface", key_of("used"))
     assert store.collect(None)[0] == 0
     assert store.collect(30.0)[0] == 1
-    assert {artifact.key for artifact in store.artifacts()} == {"used", "new"}
+    assert {artifact.key for artifact in store.artifacts()} == {key_of("used"), key_of("new")}
 
 
 def test_collect_removes_abandoned_folders_only(store):
@@ -299,7 +307,7 @@ def test_an_empty_store_is_sound(store):
 def attempt(root):
     """Locks and makes an artifact of 3 MiB."""
     store = Store(root)
-    with store.lock("surface", "k1"), store.create("surface", "k1", RECORDED) as (folder, _):
+    with store.lock("surface", K1), store.create("surface", K1, RECORDED) as (folder, _):
         for i in range(3):
             (folder / f"{i}.bin").write_bytes(bytes(2**20))
 
@@ -308,7 +316,7 @@ def attempt(root):
 @pytest.mark.parametrize("where", ["write_bytes", "write_text", "mkdir", "rename"])
 def test_a_refusal_anywhere_is_one_storage_fault(store, monkeypatch, where, code):
     """The disk may refuse a folder, a file, the record or the last rename: each time nothing stays behind."""
-    make(store, "before")
+    make(store, key_of("before"))
 
     def refuse(*_args, **_kwargs):
         raise OSError(code, os.strerror(code))
@@ -319,15 +327,15 @@ def test_a_refusal_anywhere_is_one_storage_fault(store, monkeypatch, where, code
             attempt(store.root)
     assert str(store.root) in str(error.value)
     assert "another" in str(error.value)
-    assert not store.has("surface", "k1")
+    assert not store.has("surface", K1)
     assert list((store.root / "tmp").iterdir()) == []
     assert store.check() == []
 
 
-def test_other_system_errors_stay_what_they_are(store):
-    """A file that a stage did not find is no fault of the store."""
-    with pytest.raises(FileNotFoundError), store.create("surface", "k1", RECORDED) as (folder, _):
-        (folder / "missing").read_text()
+def test_other_system_errors_stay_what_they_are(store, tmp_path):
+    """A file elsewhere that a stage did not find is no fault of the store."""
+    with pytest.raises(FileNotFoundError), store.create("surface", K1, RECORDED):
+        (tmp_path / "missing").read_text()
 
 
 @pytest.mark.parametrize("below", ["", "deep/er"])
@@ -353,12 +361,12 @@ def small_disk(tmp_path):
 def test_a_full_disk_is_a_storage_fault(small_disk):
     """A real disk of 1 MiB takes the first artifact, refuses one of 3 MiB and has its space back."""
     store = Store(small_disk / "store")
-    make(store, "small")
+    make(store, key_of("small"))
     with pytest.raises(StorageError, match="no space left"):
         attempt(store.root)
     assert list((store.root / "tmp").iterdir()) == []
-    assert [artifact.key for artifact in store.artifacts()] == ["small"]
-    make(store, "another")
+    assert [artifact.key for artifact in store.artifacts()] == [key_of("small")]
+    make(store, key_of("another"))
     assert store.check() == []
 
 
@@ -367,13 +375,13 @@ def test_a_read_only_disk_is_a_storage_fault(small_disk):
     store = Store(small_disk / "store")
     make(store)
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    assert store.open("surface", "k1").key == "k1"
-    store.touch("surface", "k1")
-    for key in ("k1", "k2"):
+    assert store.open("surface", K1).key == K1
+    store.touch("surface", K1)
+    for key in (K1, K2):
         with pytest.raises(StorageError, match="cannot be written"), store.lock("surface", key):
             pass
     with pytest.raises(StorageError, match="cannot be written"):
-        make(store, "k2")
+        make(store, K2)
 
 
 LIMITED = """
@@ -407,9 +415,9 @@ from pathlib import Path
 from pipeline.store import Store
 store = Store(Path(sys.argv[1]))
 for i in itertools.count():
-    with store.lock("surface", f"k{i}"):
+    with store.lock("surface", key_of(f"k{i}")):
         print(i, flush=True)
-        with store.create("surface", f"k{i}", {"name": "a"}) as (folder, _):
+        with store.create("surface", key_of(f"k{i}"), {"name": "a"}) as (folder, _):
             for j in range(10):
                 (folder / f"{j}.bin").write_bytes(bytes(50_000))
 """
@@ -426,7 +434,7 @@ def test_a_killed_writer_leaves_a_clean_store(store):
             process.send_signal(signal.SIGKILL)
             begun = [0, *map(int, process.stdout.read().split())]
         assert store.check() == []
-        last = f"k{begun[-1]}"
+        last = key_of(f"k{begun[-1]}")
         with store.lock("surface", last):
             if not store.has("surface", last):
                 make(store, last)

@@ -44,10 +44,10 @@ def test_doctor(tool: Tool) -> None:
     result = tool("doctor")
     assert result.code == 0
     lines = result.stdout.splitlines()
-    assert lines[0].split() == ["platform", "device", "units", "kernel"]
+    assert lines[0].split() == ["device", "units", "kernel"]
     assert any(line.endswith("works") for line in lines[1:])
     assert lines[-1].startswith("in use: ")
-    assert any("numpy 2" in line for line in lines)
+    assert any(line.split()[:1] == ["numpy"] for line in lines)
 
 
 def test_doctor_for_machines(tool: Tool) -> None:

@@ -69,7 +69,7 @@ def test_where_the_bundle_just_does_not_fit_it_is_not_there(baked: Tool, small_d
 def test_read_only(baked: Tool, small_disk: Path) -> None:
     result = baked("run", "small.toml", "--out", small_disk / "out")
     refused(result)
-    assert "Read-only file system" in result.errors[0]
+    assert "cannot be written" in result.errors[0]
     result = replace(baked, store=small_disk / "store")("run", "small.toml")
     refused(result)
 

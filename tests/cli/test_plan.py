@@ -3,6 +3,7 @@
 from tests.cli.tool import Tool
 
 STAGES = ["surface", "stack", "table", "render", "validate"]
+ALL = [*STAGES, "bundle"]
 
 
 def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> None:
@@ -11,19 +12,21 @@ def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> No
     assert result.stderr == ""
     lines = result.stdout.splitlines()
     assert lines[0] == "small:"
-    assert lines[1].split() == ["stage", "state", "cost", "why"]
-    assert [line.split()[:3] for line in lines[2:]] == [[stage, "to", "do"] for stage in STAGES]
-    assert all(line.endswith("not made before") for line in lines[2:])
+    assert lines[1].split() == ["stage", "state", "cost"]
+    assert [line.split()[:3] for line in lines[2:8]] == [[stage, "to", "do"] for stage in ALL]
+    assert lines[8:13] == [f"{stage}: not made before" for stage in STAGES]
+    assert lines[13].startswith("bundle: none of this content stands in out/small")
     assert sorted(path.name for path in tool.folder.iterdir()) == ["small.toml"]
 
 
 def test_after_a_run_all_is_cached(baked: Tool) -> None:
     told = baked("plan", "small.toml", "--json").json
     assert list(told) == ["small"]
-    assert [step["stage"] for step in told["small"]] == STAGES
+    assert [step["stage"] for step in told["small"]] == ALL
     assert {step["state"] for step in told["small"]} == {"cached"}
-    assert {step["stage"]: [step["key"]] for step in told["small"]} == baked.artifacts()
-    assert all("last time" in step["cost"] for step in told["small"])
+    assert {step["stage"]: [step["key"]] for step in told["small"][:-1]} == baked.artifacts()
+    assert told["small"][-1]["key"] == baked.bundle().name
+    assert all("last time" in step["cost"] for step in told["small"][:-1])
 
 
 def test_a_changed_key_is_named_with_both_values_and_what_follows_from_it(copy: Tool) -> None:
@@ -39,9 +42,9 @@ def test_a_changed_key_is_named_with_both_values_and_what_follows_from_it(copy: 
 
 def test_a_change_late_in_the_line_leaves_the_early_stages(copy: Tool) -> None:
     told = copy("plan", copy.config(render={"size": 48}))
-    states = {line.split()[0]: line for line in told.stdout.splitlines()[2:]}
+    states = {line.split()[0]: line for line in told.stdout.splitlines()[2:8]}
     assert all("cached" in states[stage] for stage in ("surface", "stack", "table"))
-    assert "changed: render.size 32 -> 48" in states["render"]
+    assert "render: changed: render.size 32 -> 48" in told.stdout.splitlines()
 
 
 def test_several_configs(baked: Tool, tool: Tool) -> None:

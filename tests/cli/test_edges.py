@@ -1,7 +1,4 @@
-"""Tests of faults found in cli/ and pipeline/: move each into tests/cli once it is mended.
-
-Run from the checkout: cp /tmp/w/failing_tests.py tests/cli/test_failing.py
-"""
+"""Edges at which the tool once broke: odd numbers, full disks, other people's folders, runs in each other's way."""
 
 import os
 import shutil
@@ -61,9 +58,9 @@ def test_head_closes_the_pipe(baked: Tool) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_a_cache_folder_that_cannot_be_written(tool: Tool) -> None:
+def test_a_cache_folder_that_cannot_be_written_is_done_without(tool: Tool) -> None:
     result = tool.process("doctor", environment={"XDG_CACHE_HOME": "/proc/none"})
-    assert result.code == 7, result.stderr
+    assert result.code == 0, result.stderr
 
 
 def test_plan_of_two_configs_of_one_name(tool: Tool) -> None:
@@ -83,12 +80,12 @@ def test_a_manifest_that_is_no_table(tool: Tool) -> None:
 
 
 def test_another_run_lays_out_between_copy_and_rename(copy: Tool) -> None:
-    """Both write OUT/NAME/.report.html.part: the other's rename takes it away. Seen by chance in 1 of 24 runs."""
+    """Each writes in a scratch folder of its own: neither takes the other's file away."""
     real, nested = shutil.copyfile, []
 
     def copyfile(source: Any, target: Any, **keys: Any) -> Any:
         done = real(source, target, **keys)
-        if str(target).endswith(".part") and not nested:
+        if ".writing-" in str(target) and not nested:
             nested.append(copy.process("run", "small.toml").code)
         return done
 
@@ -103,7 +100,7 @@ def test_a_full_disk_leaves_no_part_of_a_file(baked: Tool, tool: Tool) -> None:
         if not done:
             pytest.skip("cannot mount")
         assert baked("run", "small.toml", "--out", tool.folder / "disk").code == 7
-        assert list((tool.folder / "disk").rglob(".*.part")) == []
+        assert list((tool.folder / "disk").rglob(".writing-*")) == []
 
 
 @pytest.mark.parametrize("size", ["8k", "16k", "40k"])
