@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pipeline.config import Config, as_pair, load, parse
 from pipeline.errors import ConfigError
+from pipeline.stages.render import map_name
 
 MINIMAL = {"name": "a", "surface": {"recipe": {"kind": "mirror"}}}
 
@@ -70,7 +71,6 @@ def test_the_documented_sections_are_read(tmp_path):
         boundary = "periodic"
         [spectrum]
         illuminant = { lambda_nm = 532 }
-        range_nm = [400, 700]
         [material]
         fresnel = "conductor"
         shadowing = false
@@ -386,3 +386,17 @@ def test_no_file_makes_anything_but_a_config_fault(tmp_path_factory, data):
     path.write_bytes(data)
     with pytest.raises(ConfigError):
         load(path)
+
+
+def test_a_laser_line_has_no_range():
+    found = faults(with_section("spectrum", illuminant={"lambda_nm": 532}, range_nm=[400, 700]))
+    assert "no meaning with a laser line" in found["spectrum"]
+
+
+def test_lights_that_would_share_a_map_are_told():
+    """10 and 370 degrees of azimuth are one light; a millionth of a degree apart they are two, with two maps."""
+    lights = [{"theta_deg": 30, "phi_deg": 10}, {"theta_deg": 30, "phi_deg": 370}]
+    assert faults(with_section("render", lights=lights)) == {"render.lights.1": "the same light as render.lights.0"}
+    apart = [{"theta_deg": 10.0}, {"theta_deg": 10.00001}]
+    config = parse(with_section("render", lights=apart), "f", Path())
+    assert len({map_name(light) for light in config.render.lights}) == 2

@@ -131,3 +131,12 @@ def test_indices_are_not_extrapolated(tmp_path, lambda_nm):
     path = write(tmp_path, "400,1,2\n500,3,6\n")
     with pytest.raises(ScanError, match=r"400\.\.500 nm"):
         fresnel.metal_index(path, np.array([450.0, lambda_nm]))
+
+
+@pytest.mark.parametrize("row", ["-1,3", "0,3", "1.5,-3", "1,0"])
+def test_what_is_no_metal_is_refused(tmp_path, row):
+    """n <= 0 and k < 0 have no meaning here; n = 1 with k = 0 reflects nothing and would divide by zero."""
+    path = tmp_path / "odd.csv"
+    path.write_text(f"lambda_nm,n,k\n300,{row}\n900,{row}\n")
+    with pytest.raises(ScanError, match="n > 0 and k >= 0"):
+        fresnel.metal_index(str(path), np.array([500.0]))

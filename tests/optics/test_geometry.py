@@ -98,3 +98,10 @@ def test_v_cavity_by_hand(theta_deg):
     """Light along the normal: 2 (n.h)(n.wr) / (wr.h) = 2 cos t, once that is below 1 (beyond 60 degrees)."""
     expected = min(1.0, 2.0 * np.cos(np.radians(theta_deg)))
     assert geometry.v_cavity(NORMAL, tilted(theta_deg, 33.0)) == pytest.approx(expected, rel=1e-13)
+
+
+def test_v_cavity_is_finite_where_light_and_view_graze_from_opposite_sides():
+    """1 + wi.wr is zero there: no half vector, and no warning."""
+    grazing = np.nextafter(0.5 * np.pi, 0.0)
+    wi, wr = geometry.direction(grazing, 0.0), geometry.direction(grazing, np.pi)
+    assert 0.0 <= geometry.v_cavity(wi, wr) <= 1.0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import Material, Spectrum
+from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.reference import Reference, power_direct, xyz_direct
@@ -96,6 +97,17 @@ def test_what_the_window_does_not_see_changes_nothing() -> None:
     uvw, nm = geometry.uvw(wi, wr), np.array([LAMBDA_NM])
     flat, tall = (Reference(HeightField(h, (0.1, 0.1)), 0.5, 380.0).power(uvw, nm) for h in (heights, stepped))
     np.testing.assert_allclose(tall, flat, atol=1e-12)
+
+
+def test_a_window_finer_than_the_samples_is_refused() -> None:
+    """Below 1.2 pitches the samples' sum is no longer the window's integral, and fast and plain sums part."""
+    field = rough(32, 32, (0.1, 0.12), 0.05)
+    with pytest.raises(AccuracyError, match=r"sigma_um = 0.14 .* at least 1.2 pitches, 0.144 um"):
+        Reference(field, 0.14, 380.0)
+    wi, wr = pairs(20)
+    uvw = geometry.uvw(wi, wr)
+    fast = Reference(field, 0.144, 380.0).power(uvw, np.array([LAMBDA_NM]))[:, 0]
+    np.testing.assert_allclose(fast, power_direct(field, 0.144, uvw, LAMBDA_NM), atol=1e-9)
 
 
 def test_a_constant_added_to_the_heights_changes_nothing() -> None:
