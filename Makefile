@@ -47,9 +47,12 @@ install-opencl:
 bake: setup
 	$(BAKE) run configs/elaphe.toml --out $(OUT)
 
-pipeline: setup
-	@test -n "$(CONFIG)" || { echo "error: name a config: make pipeline CONFIG=configs/blazed.toml" >&2; exit 2; }
+pipeline: has-config setup
 	$(BAKE) run $(CONFIG) --out $(OUT)
+
+.PHONY: has-config
+has-config:
+	@test -n "$(CONFIG)" || { echo "error: name a config: make pipeline CONFIG=configs/blazed.toml" >&2; exit 2; }
 
 bench: setup
 	$(BAKE) bench configs/elaphe.toml
