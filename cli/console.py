@@ -128,13 +128,15 @@ class _Lines:
 
     def __init__(self) -> None:
         self._started: dict[str, float] = {}
-        self._told: set[str] = set()
 
     def __call__(self, step: str, done: float) -> None:
         now = time.monotonic()
         started = self._started.setdefault(step, now)
-        if step not in self._told and now - started > _WORTH_TELLING_S and done < 1.0:
-            self._told.add(step)
+        if done >= 1.0:
+            del self._started[step]
+        elif now - started > _WORTH_TELLING_S:
+            # told once: a step that begins again is told again
+            self._started[step] = math.inf
             note(f"  {step}: {100 * done:.0f} % after {now - started:.0f} s ...")
 
 
