@@ -42,9 +42,9 @@ def _bundle(folder: Path) -> dict[str, Any]:
 
 
 def _config(path: Path) -> dict[str, Any]:
-    from pipeline import config as configs
+    from pipeline import config_file
 
-    resolved: dict[str, Any] = configs.load(path).model_dump(mode="json")
+    resolved: dict[str, Any] = config_file.load(path).model_dump(mode="json")
     return resolved
 
 

@@ -10,10 +10,9 @@ from cli import console
 
 def load(path: Path) -> Any:
     """The config in a file, with every fault that can be seen before work starts. Raises ConfigError."""
-    from pipeline import config as configs
-    from pipeline import preflight
+    from pipeline import config_file, preflight
 
-    config = configs.load(path)
+    config = config_file.load(path)
     preflight.check(config, str(path))
     return config
 

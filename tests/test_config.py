@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config import Config, as_pair, load, parse
+from pipeline.config import Config, as_pair
+from pipeline.config_file import load, parse
 from pipeline.errors import ConfigError
 from pipeline.stages.render import map_name
 

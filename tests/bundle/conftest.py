@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from pipeline.config import Config, parse
+from pipeline.config import Config
+from pipeline.config_file import parse
 from pipeline.progress import silent
 from pipeline.stages.render import RENDER
 from pipeline.stages.stack import STACK
