@@ -35,7 +35,7 @@ def render_command(
     """
     from pipeline import images, scratch
     from pipeline.config import Direction
-    from pipeline.evaluate import Map, render_map
+    from pipeline.evaluate import Map, relative_unit, render_map
     from pipeline.optics.colour_error import pixels
     from pipeline.stages import render
     from pipeline.store import writing
@@ -45,7 +45,7 @@ def render_command(
     config = sources.load(config_path)
     lights = config.render.lights if theta is None else [Direction(theta_deg=theta, phi_deg=phi or 0.0)]
     views = Map(size or config.render.size, render.map_radius(config))
-    folder, made = out / config.name, []
+    folder, unit, made = out / config.name, relative_unit(config), []
     with console.showing_progress() as progress:
         evaluate = sources.config_evaluator(config, exact, store_root, progress)
         shown = [render_map(evaluate, render.light_direction(light), views) for light in lights]
@@ -55,7 +55,7 @@ def render_command(
         for light, image in zip(lights, shown, strict=True):
             name = render.map_name(light) + ("_exact" if exact else "")
             images.write_xyz(beside / f"{name}.exr", image)
-            images.write_png(beside / f"{name}.png", pixels(image, exposure or config.render.exposure_ru))
+            images.write_png(beside / f"{name}.png", pixels(image / unit, exposure or config.render.exposure_ru))
             made += [str(folder / f"{name}.exr"), str(folder / f"{name}.png")]
     if as_json:
         console.print_json({"files": made})

@@ -34,6 +34,12 @@ def table_evaluator(table: taylor.TaylorTable, config: Config, progress: Progres
     return evaluate
 
 
+def relative_unit(config: Config) -> float:
+    """Y of 1 RU in a config's normalisation: what exposures are multiples of."""
+    quadrature = trapezoid(config.spectrum, config.table.step_nm)
+    return brdf.relative_unit(config.material, quadrature, config.coherence.sigma_um)
+
+
 @dataclass(frozen=True)
 class Map:
     """The views of a BRDF map ([D14] sec. 7): pixel centre (x, y) in [-1, 1]^2 is (sin t cos p, sin t sin p).

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline import stack as dft_stack
 from pipeline.config import Config
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import Evaluator, Map, table_evaluator
+from pipeline.evaluate import Evaluator, Map, relative_unit, table_evaluator
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import ColourError, colour_errors, delta_e
 from pipeline.optics.geometry import Array
@@ -62,7 +62,8 @@ def _integrand(config: Config, step_nm: float) -> Quadrature:
 
 
 def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourError]:
-    return colour_errors(found, truth, config.accuracy.exposure_ru)
+    unit = relative_unit(config)
+    return colour_errors(found / unit, truth / unit, config.accuracy.exposure_ru)
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def check_random(
 
 @dataclass(frozen=True)
 class MapCheck:
-    """A table against the reference on one light's map; images are XYZ (size, size, 3)."""
+    """A table against the reference on one light's map; images are XYZ (size, size, 3) in RU."""
 
     light: Array
     views: Map
@@ -117,7 +118,8 @@ def check_map(
     wi = np.broadcast_to(light, wr.shape)
     truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
-    return MapCheck(light, views, views.image(found), views.image(truth), _colour_errors(config, found, truth))
+    unit, errors = relative_unit(config), _colour_errors(config, found, truth)
+    return MapCheck(light, views, views.image(found / unit), views.image(truth / unit), errors)
 
 
 def check_reference(field: HeightField, reference: Reference, config: Config, directions: int = 4) -> RelativeError:
@@ -223,4 +225,5 @@ class Convergence:
         return brdf.direction_factor(self._config.material, plain, self._wi, self._wr)[:, None] * summed
 
     def _error(self, xyz: Array) -> float:
-        return float(np.mean(delta_e(xyz, self._truth, self._config.accuracy.exposure_ru)))
+        unit = relative_unit(self._config)
+        return float(np.mean(delta_e(xyz / unit, self._truth / unit, self._config.accuracy.exposure_ru)))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline.bundle.manifest import HalfPrecision, RelativeErrors
 from pipeline.config import Config
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import table_evaluator
+from pipeline.evaluate import relative_unit, table_evaluator
 from pipeline.optics import brdf
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
@@ -72,7 +72,7 @@ def measure_half(config: Config, table: TaylorTable, scale: Array) -> HalfPrecis
     """
     wi, wr = random_pairs(config, RANDOM_DIRECTIONS)
     rounded = in_half(table, scale)
-    errors, worst = {}, 0.0
+    errors, worst, unit = {}, 0.0, relative_unit(config)
     for name, views in (("random", wr), ("mirror", wi * [-1.0, -1.0, 1.0])):
         before, after = (table_evaluator(t, config)(wi, views) for t in (table, rounded))
         known = np.isfinite(before[:, 1])  # a scene need not hold the mirror directions of its lights
@@ -81,7 +81,7 @@ def measure_half(config: Config, table: TaylorTable, scale: Array) -> HalfPrecis
         if known.any():
             found = relative_error(after[:, 1] / mirror, before[:, 1] / mirror, MIRROR_FLOOR)
             errors[name] = RelativeErrors(**asdict(found))
-            worst = max(worst, float(np.max(delta_e(after, before, _HALF_EXPOSURE_RU))))
+            worst = max(worst, float(np.max(delta_e(after / unit, before / unit, _HALF_EXPOSURE_RU))))
     half = HalfPrecision(
         directions=len(wi),
         relative_error_of_y=errors,

@@ -63,6 +63,11 @@ def window_area(material: Material, quadrature: Quadrature, sigma_um: float) -> 
     return 4.0 * pi * (sigma_um / (1e-3 * quadrature.lambda_nm)) ** 2
 
 
+def relative_unit(material: Material, quadrature: Quadrature, sigma_um: float) -> float:
+    """Y of 1 RU: a perfect mirror at normal incidence. 1 for `relative`; for `absolute` its peak BRDF in 1/sr."""
+    return float(window_area(material, quadrature, sigma_um) @ quadrature.weights[:, 1])
+
+
 def metal_reflectance(material: Material, quadrature: Quadrature, cos_half: Array) -> Array:
     """R_l(half angle) (..., L) of the metal; `relative` divides by its luminous mean at normal incidence."""
     index = fresnel.metal_index(material.metal, quadrature.lambda_nm)

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline import images
 from pipeline.config import Config, Direction
-from pipeline.evaluate import Map, render_map, table_evaluator
+from pipeline.evaluate import Map, relative_unit, render_map, table_evaluator
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import pixels
 from pipeline.optics.geometry import Array
@@ -41,13 +41,13 @@ def map_radius(config: Config) -> float:
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     evaluate = table_evaluator(table.load(inputs["table"]), config)
-    views = Map(config.render.size, map_radius(config))
+    views, unit = Map(config.render.size, map_radius(config)), relative_unit(config)
     maps = []
     for i, light in enumerate(config.render.lights):
         image = render_map(evaluate, light_direction(light), views)
         stem = map_name(light)
         images.write_xyz(folder / f"{stem}.exr", image)
-        images.write_png(folder / f"{stem}.png", pixels(image, config.render.exposure_ru))
+        images.write_png(folder / f"{stem}.png", pixels(image / unit, config.render.exposure_ru))
         maps.append({**light.model_dump(), "exr": f"{stem}.exr", "png": f"{stem}.png"})
         progress("maps", (i + 1) / len(config.render.lights))
     return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}

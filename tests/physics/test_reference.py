@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.config import Material, Spectrum
+from pipeline.config import LaserLine, Material, Spectrum
 from pipeline.errors import AccuracyError
-from pipeline.optics import geometry
+from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
+from pipeline.optics.spectra import trapezoid
 from pipeline.reference import Reference, power_direct, xyz_direct
 from pipeline.surface.heightfield import HeightField
 
@@ -159,6 +160,20 @@ def test_a_mirror_seen_in_its_own_reflection_is_one_ru() -> None:
     for fresnel in ("none", "schlick", "dielectric", "conductor"):
         xyz = reference.xyz(Spectrum(), Material(fresnel=fresnel), straight, straight)
         assert xyz[0, 1] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_one_ru_is_a_mirror_in_either_normalisation() -> None:
+    """A perfect mirror's peak BRDF is the unit of exposures: in it, absolute and relative are one for a laser."""
+    spectrum, straight = Spectrum(illuminant=LaserLine(lambda_nm=532.0)), np.array([[0.0, 0.0, 1.0]])
+    reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 532.0)
+    wi, wr = pairs(20)
+    found = []
+    for normalisation in ("relative", "absolute"):
+        material = Material(fresnel="none", normalisation=normalisation)
+        unit = brdf.relative_unit(material, trapezoid(spectrum, 1.0), 1.0)
+        assert reference.xyz(spectrum, material, straight, straight)[0, 1] / unit == pytest.approx(1.0, rel=1e-12)
+        found.append(reference.xyz(spectrum, material, wi, wr) / unit)
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 40.0])
