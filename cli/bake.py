@@ -179,10 +179,10 @@ def _plan(config: Config, store: Any, folder: Path) -> list[dict[str, str]]:
             "stage": step.stage.name,
             "key": step.key,
             "state": "cached" if step.cached else "to do",
-            "reason": step.reason,
-            "cost": step.cost,
+            "reason": told.reason,
+            "cost": told.cost,
         }
-        for step in steps
+        for step, told in zip(steps, run.explain(config, steps, store), strict=True)
     ]
     standing = published(config, {step.stage.name: step.key for step in steps}, folder)
     bundle = {

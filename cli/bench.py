@@ -1,5 +1,6 @@
 """`bench`: the paper-sized bake, timed."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -26,7 +27,7 @@ def bench_command(config_path: Path, store_root: Path | None, as_json: bool) -> 
         field = surface.load(store.open("surface", artifacts["surface"].key))
         result = bench.paper_bake(config, field, progress)
     if as_json:
-        console.print_json(result.as_dict())
+        console.print_json(asdict(result))
         return
     n = config.table.resolution
     click.echo(

@@ -2,8 +2,8 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -48,9 +48,6 @@ class PaperBench:
     peak_flops: float
     table_share: float
     agreement: float
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def paper_bake(config: Config, field: HeightField, progress: Progress = silent) -> PaperBench:

@@ -24,29 +24,39 @@ _ON_DEVICE = {"table", "validate"}
 
 @dataclass(frozen=True)
 class Step:
-    """One stage of a plan: its address, whether it stands in the store, and why."""
+    """One stage of a plan: its address, and whether it stands in the store."""
 
     stage: Stage
     key: str
     cached: bool
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why a step is cached or to do, and its cost, in words."""
+
     reason: str
     cost: str
 
 
 def plan(config: Config, store: Store, until: str = "validate") -> list[Step]:
-    """The steps up to and including stage `until`, each cached or to do, with the reason. Writes nothing."""
+    """The steps up to and including stage `until`, each cached or to do. Writes nothing."""
     keys: dict[str, str] = {}
-    steps: list[Step] = []
-    earlier = store.artifacts()
     for stage in _needed(until):
-        key = stage.key(config, keys)
-        keys[stage.name] = key
-        cached = store.has(stage.name, key)
-        last = _latest(earlier, stage.name, config.name)
-        made = {step.stage.name for step in steps if not step.cached}
-        reason = UNCHANGED if cached else _reason(stage, config, made, last)
-        steps.append(Step(stage, key, cached, reason, _cost(stage, config, last)))
-    return steps
+        keys[stage.name] = stage.key(config, keys)
+    return [Step(stage, keys[stage.name], store.has(stage.name, keys[stage.name])) for stage in _needed(until)]
+
+
+def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
+    """What is to be said of each step of a plan; reads the records of the whole store."""
+    earlier = store.artifacts()
+    made = {step.stage.name for step in steps if not step.cached}
+    told = []
+    for step in steps:
+        last = _latest(earlier, step.stage.name, config.name)
+        reason = UNCHANGED if step.cached else _reason(step.stage, config, made, last)
+        told.append(Explanation(reason, _cost(step.stage, config, last)))
+    return told
 
 
 def _needed(until: str) -> list[Stage]:

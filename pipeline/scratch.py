@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 _REPLACING = ".writing-"
-
 _FOREIGN_ABANDONED_AFTER_S = 24 * 3600.0
 
 
@@ -62,5 +61,5 @@ def _alive(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except PermissionError:
-        return True
+        pass  # it is somebody else's, and alive
     return True

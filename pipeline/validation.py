@@ -61,6 +61,13 @@ def _integrand(config: Config, step_nm: float) -> Quadrature:
     return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
+def mirror_luminance(config: Config, wi: Array, wr: Array) -> Array:
+    """Y (directions,) that |P|^2 = 1 at every wavelength would give at these directions."""
+    plain = trapezoid(config.spectrum, config.table.step_nm)
+    inside = _integrand(config, config.table.step_nm).weights[:, 1].sum()
+    return brdf.direction_factor(config.material, plain, wi, wr) * float(inside)
+
+
 def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourError]:
     unit = relative_unit(config)
     return colour_errors(found / unit, truth / unit, config.accuracy.exposure_ru)
@@ -82,10 +89,9 @@ def check_random(
     wi, wr = random_pairs(config, RANDOM_DIRECTIONS)
     truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
-    # without C cos(ti) what is left is |P|^2 seen through Y
-    factor = brdf.direction_factor(config.material, trapezoid(config.spectrum, STEP_NM), wi, wr)
-    scale = _integrand(config, config.table.step_nm).weights[:, 1].sum()
-    power = relative_error(found[:, 1] / factor / scale, truth[:, 1] / factor / scale, MIRROR_FLOOR)
+    # over a mirror's Y what is left is |P|^2
+    mirror = mirror_luminance(config, wi, wr)
+    power = relative_error(found[:, 1] / mirror, truth[:, 1] / mirror, MIRROR_FLOOR)
     return RandomCheck(len(wi), power, _colour_errors(config, found, truth))
 
 
@@ -93,7 +99,6 @@ def check_random(
 class MapCheck:
     """A table against the reference on one light's map; images are XYZ (size, size, 3) in RU."""
 
-    light: Array
     views: Map
     table: Array
     reference: Array
@@ -119,7 +124,7 @@ def check_map(
     truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
     unit, errors = relative_unit(config), _colour_errors(config, found, truth)
-    return MapCheck(light, views, views.image(found / unit), views.image(truth / unit), errors)
+    return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors)
 
 
 def check_reference(field: HeightField, reference: Reference, config: Config, directions: int = 4) -> RelativeError:
@@ -175,6 +180,7 @@ class Convergence:
         radius: float,
     ) -> None:
         self._stack, self._chosen, self._config = stack, chosen, config
+        self._unit = relative_unit(config)
         self._wr = Map(self._MAP_SIZE, min(MAP_RADIUS, radius)).views()
         self._wi = np.broadcast_to(light, self._wr.shape)
         self._uvw = geometry.uvw(self._wi, self._wr)
@@ -225,5 +231,5 @@ class Convergence:
         return brdf.direction_factor(self._config.material, plain, self._wi, self._wr)[:, None] * summed
 
     def _error(self, xyz: Array) -> float:
-        unit = relative_unit(self._config)
-        return float(np.mean(delta_e(xyz / unit, self._truth / unit, self._config.accuracy.exposure_ru)))
+        exposure = self._config.accuracy.exposure_ru
+        return float(np.mean(delta_e(xyz / self._unit, self._truth / self._unit, exposure)))

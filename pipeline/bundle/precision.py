@@ -10,12 +10,10 @@ from pipeline.bundle.manifest import HalfPrecision, RelativeErrors
 from pipeline.config import Config
 from pipeline.errors import AccuracyError
 from pipeline.evaluate import relative_unit, table_evaluator
-from pipeline.optics import brdf
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
 from pipeline.tables.taylor import TaylorTable
-from pipeline.validation import MIRROR_FLOOR, RANDOM_DIRECTIONS, random_pairs, relative_error
+from pipeline.validation import MIRROR_FLOOR, RANDOM_DIRECTIONS, mirror_luminance, random_pairs, relative_error
 
 # a scaled table peaks in [2^14, 2^15): one octave below half's largest number is left to filters that sum
 _PEAK_EXPONENT = 14
@@ -76,7 +74,7 @@ def measure_half(config: Config, table: TaylorTable, scale: Array) -> HalfPrecis
     for name, views in (("random", wr), ("mirror", wi * [-1.0, -1.0, 1.0])):
         before, after = (table_evaluator(t, config)(wi, views) for t in (table, rounded))
         known = np.isfinite(before[:, 1])  # a scene need not hold the mirror directions of its lights
-        mirror = _mirror(config, wi, views)[known]
+        mirror = mirror_luminance(config, wi, views)[known]
         before, after = before[known], after[known]
         if known.any():
             found = relative_error(after[:, 1] / mirror, before[:, 1] / mirror, MIRROR_FLOOR)
@@ -108,10 +106,3 @@ def _refuse_lost_digits(half: HalfPrecision) -> None:
         f"{told} ({100 * _MOST_HALF_ERROR:g} % allowed), colours by up to dE {half.largest_delta_e:.3g} at "
         f'{half.exposure_ru:g} RU. Set publish.precision = "float"'
     )
-
-
-def _mirror(config: Config, wi: Array, wr: Array) -> Array:
-    """Y of |P|^2 = 1 at these directions, (directions,)."""
-    plain = trapezoid(config.spectrum, config.table.step_nm)
-    inside = brdf.integrand(config.material, config.spectrum, config.table.step_nm, config.coherence.sigma_um)
-    return brdf.direction_factor(config.material, plain, wi, wr) * float(inside.weights[:, 1].sum())

@@ -24,13 +24,12 @@ def direction_factor(material: Material, quadrature: Quadrature, wi: Array, wr: 
     """
     cos_half = geometry.cos_half(wi, wr)
     reflected = _reflectance(material, quadrature, cos_half)
-    if material.normalisation == "relative":
+    relative = material.normalisation == "relative"
+    # of a metal the spectral factor carries the reflectance at normal incidence, so only the ratio is left
+    if relative or material.fresnel == "conductor":
         reflected = reflected / _reflectance(material, quadrature, np.array(1.0))
-        if material.fresnel == "schlick":
-            reflected = reflected**2
-    elif material.fresnel == "conductor":
-        # the spectral factor carries the metal at normal incidence, so only the ratio is left
-        reflected = reflected / _reflectance(material, quadrature, np.array(1.0))
+    if relative and material.fresnel == "schlick":
+        reflected = reflected**2
     return reflected * geometry_factor(material, wi, wr)
 
 
