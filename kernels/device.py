@@ -196,6 +196,24 @@ def download(buffer: Any, out: np.ndarray) -> np.ndarray:
     return out
 
 
+def shared(array: np.ndarray) -> Any:
+    """A device buffer in the array's own memory where the device shares it; call `settle` before reading the array."""
+    cl = _opencl()
+    return cl.Buffer(
+        default_device().context, cl.mem_flags.READ_WRITE | cl.mem_flags.USE_HOST_PTR, hostbuf=array
+    )
+
+
+def settle(buffer: Any, array: np.ndarray) -> np.ndarray:
+    """Makes what kernels wrote into a shared buffer visible in its array, which it returns."""
+    cl = _opencl()
+    mapped, _ = cl.enqueue_map_buffer(
+        default_device().queue, buffer, cl.map_flags.READ, 0, (array.nbytes,), np.uint8, is_blocking=True
+    )
+    mapped.base.release()
+    return array
+
+
 def measure_peak(seconds: float = 0.5) -> float:
     """Double-precision operations a second of this device, by chains of fused multiply-adds."""
     peak = program(("peak.cl",), {})

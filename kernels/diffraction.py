@@ -9,6 +9,7 @@ import numpy as np
 from kernels import device
 
 _LANES = 8  # doubles in one vector of the kernels
+_VECTOR_BYTES = 64  # a double8 or a float16
 _TILE = 4096  # nodes or directions in one launch: bounds memory and paces progress
 _GRID = np.dtype(
     [
@@ -47,17 +48,25 @@ def upload_stack(
     half_range_um: float,
     band_per_um: tuple[float, float],
 ) -> DeviceStack:
-    """Pads the terms to whole vectors and copies the stack to the device. `zero` is (row, column) of f = 0."""
+    """Pads the terms to whole vectors and copies the stack to the device. `zero` is (row, column) of f = 0.
+
+    A float32 stack stays float32, and where its terms fill whole vectors it is shared with the device, not copied.
+    """
     rows, columns, _, terms = coefficients.shape
-    blocks = -(-terms // _LANES)
-    padded = np.zeros((rows, columns, 2, blocks * _LANES))
-    padded[..., :terms] = coefficients
+    lanes = _VECTOR_BYTES // coefficients.itemsize
+    blocks = -(-terms // lanes)
     inverse = 0.5 / sigma_f_per_um**2
     grid = np.array([(*spacing_per_um, inverse, columns, *zero, 0)], dtype=_GRID)
     constants = {"TERMS": terms, "BLOCKS": blocks, "REACH_X": reach[0], "REACH_Y": reach[1]}
     offsets = [np.arange(-r, r + 1) * d for r, d in zip(reach, spacing_per_um, strict=True)]
-    decay = np.exp(-(np.concatenate(offsets) ** 2) * inverse)
-    return DeviceStack(device.upload(padded), device.upload(decay), grid, constants, half_range_um, band_per_um)
+    decay = np.exp(-(np.concatenate(offsets) ** 2) * inverse).astype(coefficients.dtype)
+    if terms == blocks * lanes:
+        buffer = device.shared(coefficients)
+    else:
+        padded = np.zeros((rows, columns, 2, blocks * lanes), coefficients.dtype)
+        padded[..., :terms] = coefficients
+        buffer = device.shared(padded)
+    return DeviceStack(buffer, device.upload(decay), grid, constants, half_range_um, band_per_um)
 
 
 def taylor_table(
@@ -72,7 +81,7 @@ def taylor_table(
     width = 2 * _LANES * stack.constants["BLOCKS"]
     program = device.program(("windowed_dft.cl", "taylor_table.cl"), stack.constants)
     series = _taylor_series(lambda_um, stack.half_range_um, stack.constants)
-    nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, _fourth_column(weights)))
+    nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, fourth_column(weights)))
     tile = np.empty((_TILE, 3, width))
     result = device.result_buffer(tile.nbytes)
     for first in range(0, len(uv), _TILE):
@@ -102,7 +111,7 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
     groups = -(-len(lambda_um) // _LANES)
     padded = np.full(groups * _LANES, lambda_um[-1])
     padded[: len(lambda_um)] = lambda_um
-    directions, wavelengths = device.upload(_fourth_column(uvw)), device.upload(padded)
+    directions, wavelengths = device.upload(fourth_column(uvw)), device.upload(padded)
     out = np.empty((len(uvw), groups * _LANES))
     result = device.result_buffer(out.nbytes)
     program.launch(
@@ -131,6 +140,6 @@ def _taylor_series(lambda_um: np.ndarray, half_range_um: float, constants: dict[
     return series
 
 
-def _fourth_column(rows: np.ndarray) -> np.ndarray:
+def fourth_column(rows: np.ndarray) -> np.ndarray:
     """Rows of three as OpenCL's 4-vectors."""
     return np.pad(rows, ((0, 0), (0, 1)))

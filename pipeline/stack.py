@@ -6,13 +6,15 @@ Two series share one form, sum_n c_n(k w) t^n or T_n(t), t = h / H in [-1, 1]:
 - Chebyshev (Jacobi-Anger): terms T_n(t), c_n = (2 - [n = 0]) i^n J_n(k w H).
 """
 
-from collections.abc import Iterator
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import floor
-from typing import Literal
+from queue import SimpleQueue
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 from scipy.fft import next_fast_len
 
 from pipeline.errors import AccuracyError
@@ -25,6 +27,9 @@ Basis = Literal["taylor", "chebyshev"]
 # 1e-12 of the window's sum is lost to the gaps between samples
 LEAST_SIGMA_PITCHES = 1.2
 _MOST_BYTES = 6 * 2**30
+# terms transformed together fill whole cache lines of the coefficients; rows of one block stay in a core's cache
+_LINE_BYTES = 64
+_BLOCK_SAMPLES = 2**15
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class Stack:
 
     The other half is its conjugate, for heights are real. The sign is Stam's.
 
-    coefficients: float64 (rows, columns, 2, terms): real and imaginary part, terms side by side.
+    coefficients: float64 or float32 (rows, columns, 2, terms): real and imaginary part, terms side by side.
     row_zero, column_zero: where psi = 0 and phi = 0 stand; phi starts `reach` coefficients below 0.
     spacing_per_um: (dphi, dpsi), 1/um: one over the patch's size.
     reach: coefficients (x, y) that the window's transform needs on either side of the nearest one.
@@ -41,7 +46,7 @@ class Stack:
     """
 
     basis: Basis
-    coefficients: Array
+    coefficients: NDArray[Any]
     row_zero: int
     column_zero: int
     spacing_per_um: tuple[float, float]
@@ -63,10 +68,13 @@ def build(
     frequency_max_per_um: float,
     tolerance: float,
     progress: Progress = silent,
+    dtype: DTypeLike = np.float64,
 ) -> Stack:
     """The stack of `terms` terms for |f| <= `frequency_max_per_um` and the band, window cut at `tolerance`.
 
-    Raises AccuracyError where it would not fit into memory, or the samples do not resolve the window.
+    Terms are made in float64 whatever `dtype` they are transformed and kept in: a recurrence in float32 would lose
+    n^2 of its digits at |t| = 1. Raises AccuracyError where the stack would not fit into memory, or the samples do
+    not resolve the window.
     """
     _check_window(sigma_um, field.pitch_um)
     # centred after the crop: what is left may lie off the whole patch's mid-range
@@ -79,16 +87,17 @@ def build(
         floor(min(frequency_max_per_um, b) / d + 0.5) + r for b, d, r in zip(band, spacing, reach, strict=True)
     )
     shape = (2 * psi_max + 1, phi_max + reach[0] + 1, 2, terms)
-    _check_memory(shape)
-    coefficients = np.empty(shape)
+    _check_memory(shape, np.dtype(dtype).itemsize)
+    coefficients = np.empty(shape, dtype)
     half_range = field.half_range_um
     t = field.heights_um / half_range if half_range > 0 else field.heights_um
     # terms are made sample by sample, so the origin can move to sample 0 once for all
-    transform = _PrunedTransform(field.shape, psi_max, phi_max, reach[0])
-    for n, term in enumerate(basis_terms(np.fft.ifftshift(t), basis, terms)):
-        transformed = transform(term)
-        coefficients[:, :, 0, n], coefficients[:, :, 1, n] = transformed.real, transformed.imag
-        progress("stack", (n + 1) / terms)
+    series = _Series(np.fft.ifftshift(t), basis)
+    together = min(terms, _LINE_BYTES // np.dtype(dtype).itemsize)
+    transform = _PrunedTransform(field.shape, psi_max, phi_max, reach[0], together, dtype)
+    for first in range(0, terms, together):
+        transform(series, first, coefficients[..., first : first + together])
+        progress("stack", min(1.0, (first + together) / terms))
     return Stack(basis, coefficients, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
 
 
@@ -130,16 +139,23 @@ def window_reach(spacing: tuple[float, float], sigma_um: float, tolerance: float
     return x, y
 
 
-def basis_terms(t: Array, basis: Basis, terms: int) -> Iterator[Array]:
-    """t^n or T_n(t) for n = 0 .. terms - 1, by recurrence."""
-    before, term = np.ones_like(t), t.copy()
-    yield before
-    for _ in range(1, terms):
-        yield term
-        if basis == "taylor":
-            term = term * t
-        else:
-            before, term = term, 2.0 * t * term - before
+class _Series:
+    """t^n or T_n(t), n = 0, 1, ..., by recurrence; row blocks are independent of each other."""
+
+    def __init__(self, t: Array, basis: Basis) -> None:
+        self._t, self._basis = t, basis
+        # T_n takes the place of T_(n-2); powers need one place only
+        self._places = [np.ones_like(t), t.copy()] if basis == "chebyshev" else [np.ones_like(t)]
+
+    def term(self, rows: slice, n: int) -> Array:
+        """The n-th term of a row block; ask each block for every n in order, once."""
+        t, term = self._t[rows], self._places[n % len(self._places)][rows]
+        if self._basis == "taylor" and n > 0:
+            term *= t
+        elif n > 1:
+            # T_n = 2 t T_(n-1) - T_(n-2)
+            np.subtract(2.0 * t * self._places[(n - 1) % 2][rows], term, out=term)
+        return term
 
 
 class _PrunedTransform:
@@ -149,39 +165,67 @@ class _PrunedTransform:
     the band limit equal those over the samples.
     """
 
-    def __init__(self, shape: tuple[int, int], psi_max: int, phi_max: int, reach_x: int) -> None:
-        import os
-
+    def __init__(
+        self, shape: tuple[int, int], psi_max: int, phi_max: int, reach_x: int, together: int, dtype: DTypeLike
+    ) -> None:
         import pyfftw
 
         ny, nx = shape
         phi = (np.arange(-reach_x, phi_max + 1) + nx // 2) % nx - nx // 2
-        self._columns = np.abs(phi)
+        self._samples = ny * nx
+        self._columns, self._mirrored = np.abs(phi), phi < 0
         self._kept = int(self._columns.max()) + 1
-        self._mirrored = phi < 0
         self._rows = np.arange(-psi_max, psi_max + 1) % ny
-        self._input = pyfftw.empty_aligned((ny, nx), dtype="float64")
-        half = pyfftw.empty_aligned((ny, nx // 2 + 1), dtype="complex128")
-        self._half = half
-        self._narrow = pyfftw.empty_aligned((ny, self._kept), dtype="complex128")
+        self._block = max(1, _BLOCK_SAMPLES // nx)
+        self._blocks = [slice(first, min(first + self._block, ny)) for first in range(0, ny, self._block)]
+        real, self._complex = np.dtype(dtype), np.result_type(dtype, np.complex64)
+        # every plane begins on a cache line, as the plan expects
+        line = _LINE_BYTES // self._complex.itemsize
+        padded = -(-self._kept // line) * line
+        self._narrow = pyfftw.empty_aligned((together, ny, padded), dtype=self._complex, n=_LINE_BYTES)
         # planning by measurement costs seconds and wins milliseconds on a few dozen transforms
-        options = {"threads": os.cpu_count() or 1, "flags": ("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT")}
-        self._along_x = pyfftw.FFTW(self._input, half, axes=(1,), **options)
-        self._along_y = pyfftw.FFTW(self._narrow, self._narrow, axes=(0,), **options)
+        flags = ("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT")
+        self._threads = os.cpu_count() or 1
+        # buffers and plans are no two threads' at once
+        self._along_x: SimpleQueue[Any] = SimpleQueue()
+        for _ in range(self._threads):
+            rows = pyfftw.empty_aligned((self._block, nx), dtype=real)
+            half = pyfftw.empty_aligned((self._block, nx // 2 + 1), dtype=self._complex)
+            self._along_x.put(pyfftw.FFTW(rows, half, axes=(1,), flags=flags))
+        plane = self._narrow[0, :, : self._kept]
+        self._along_y = pyfftw.FFTW(plane, plane, axes=(0,), flags=flags, threads=self._threads)
 
-    def __call__(self, term: Array) -> NDArray[np.complex128]:
-        self._input[:] = term
-        self._along_x()
-        self._narrow[:] = self._half[:, : self._kept]
-        self._along_y()
-        # FFTW's sign is exp(-2 pi i f.x): for real input f and -f are conjugates
-        right = np.conj(self._narrow[self._rows]) / term.size
-        left = self._narrow[-self._rows % len(self._narrow)] / term.size
-        return np.asarray(np.where(self._mirrored, left[:, self._columns], right[:, self._columns]))
+    def __call__(self, series: _Series, first: int, out: NDArray[Any]) -> None:
+        """Terms `first` ... of a series into `out` (rows, columns, 2, terms)."""
+        terms = range(out.shape[3])
+
+        def along_x(rows: slice) -> None:
+            plan = self._along_x.get()
+            for n in terms:
+                plan.input_array[: rows.stop - rows.start] = series.term(rows, first + n)
+                self._narrow[n, rows, : self._kept] = plan()[: rows.stop - rows.start, : self._kept]
+            self._along_x.put(plan)
+
+        with ThreadPoolExecutor(self._threads) as pool:
+            list(pool.map(along_x, self._blocks))
+            for n in terms:
+                plane = self._narrow[n, :, : self._kept]
+                self._along_y.update_arrays(plane, plane)
+                self._along_y.execute()
+            list(pool.map(lambda row: self._take(row, out), range(out.shape[0])))
+
+    def _take(self, row: int, out: NDArray[Any]) -> None:
+        """One row of coefficients, from the transform's row and, where phi < 0, from its mirror image."""
+        terms = out.shape[3]
+        psi = self._rows[row]
+        right, left = self._narrow[:terms, psi], self._narrow[:terms, -psi]
+        found = np.where(self._mirrored, left[:, self._columns], np.conj(right[:, self._columns])).T
+        found /= self._samples
+        out[row, :, 0], out[row, :, 1] = found.real, found.imag
 
 
-def _check_memory(shape: tuple[int, ...]) -> None:
-    need = 8 * int(np.prod(shape, dtype=np.int64))
+def _check_memory(shape: tuple[int, ...], itemsize: int) -> None:
+    need = itemsize * int(np.prod(shape, dtype=np.int64))
     if need > _MOST_BYTES:
         raise AccuracyError(
             f"the stack of {shape[3]} terms on {shape[0]} x {shape[1]} frequencies needs {need / 2**30:.1f} GiB, "

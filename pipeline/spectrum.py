@@ -1,0 +1,86 @@
+"""The polar power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2: what a surface does to any light.
+
+It knows no illuminant, observer or material: |P|^2(u, v, w; lambda) = E(rho / lambda, phi, 2 pi |w| / lambda) with
+(rho, phi) the polar form of (u, v). Nodes in s are Chebyshev's, so E between them is a polynomial; nodes in r serve
+Lagrange interpolation; azimuths are those of the tables made from it.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import jv
+
+from kernels import polar
+from pipeline import series, stack
+from pipeline.device_stack import upload
+from pipeline.optics.coherence import sigma_f
+from pipeline.optics.geometry import Array
+from pipeline.progress import Progress, silent
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar_grid import Azimuths
+
+# radii lie one sigma_f apart, where interpolation on 8 nodes and integration over wavelengths leave 1e-4 of E; near the
+# origin four times closer, for there the specular lobe's flank is seen at full contrast
+_SPACING, _SPACING_AT_ZERO = 1.0, 0.25
+_COARSENS_OVER = 30.0  # sigma_f
+_SPARE_RADII = 5
+
+
+@dataclass(frozen=True)
+class PolarSpectrum:
+    """E on radii, azimuths and nodes in s.
+
+    values: float32 (tiles, radii, s nodes, 16): azimuth 16 tile + lane; 0 beyond the scan's band.
+    radius_per_um: (radii,) ascending from 0. s_max_per_um: E is known for s in [0, s_max], at Chebyshev's nodes.
+    """
+
+    values: NDArray[np.float32]
+    radius_per_um: Array
+    azimuths: Azimuths
+    s_max_per_um: float
+    sigma_um: float
+    band_per_um: tuple[float, float]
+
+    @property
+    def s_per_um(self) -> Array:
+        """The nodes in s = 2 pi |w| / lambda, 1/um."""
+        return s_nodes(self.values.shape[2], self.s_max_per_um)
+
+
+def s_nodes(count: int, s_max_per_um: float) -> Array:
+    """Chebyshev's nodes on [0, s_max]."""
+    return np.asarray(0.5 * s_max_per_um * (1.0 + np.cos(pi * (np.arange(count) + 0.5) / count)))
+
+
+def radii(sigma_um: float, r_max_per_um: float) -> Array:
+    """Radii from 0 to `r_max_per_um` and a few beyond, spaced by the width of the window's transform, 1/um."""
+    width = sigma_f(sigma_um)
+    nodes = [0.0]
+    while nodes[-1] < r_max_per_um:
+        share = min(1.0, nodes[-1] / (_COARSENS_OVER * width))
+        nodes.append(nodes[-1] + width * (_SPACING_AT_ZERO + (_SPACING - _SPACING_AT_ZERO) * share))
+    return np.array(nodes + [nodes[-1] + width * _SPACING * i for i in range(1, _SPARE_RADII)])
+
+
+def chebyshev_stack(
+    field: HeightField, sigma_um: float, r_max_per_um: float, terms: int, tolerance: float, progress: Progress = silent
+) -> stack.Stack:
+    """The float32 stack that E up to `r_max_per_um` gathers from."""
+    reach = float(radii(sigma_um, r_max_per_um)[-1])
+    return stack.build(field, "chebyshev", terms, sigma_um, reach, tolerance, progress, np.float32)
+
+
+def build(
+    built: stack.Stack, azimuths: Azimuths, lambda_min_nm: float, r_max_per_um: float, nodes: int
+) -> PolarSpectrum:
+    """E of a Chebyshev stack; s reaches the shortest wavelength at |w| = 2. Raises DeviceError without a device."""
+    s_max = 2.0 * pi * series.W_MAX / (1e-3 * lambda_min_nm)
+    radius = radii(built.sigma_um, r_max_per_um)
+    n = np.arange(built.terms)[:, None]
+    # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
+    bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, s_nodes(nodes, s_max) * built.half_range_um)
+    half_turn = azimuths.angles()[: azimuths.count // 2]
+    values = polar.polar_spectrum(upload(built), radius, half_turn, bessel)
+    return PolarSpectrum(values, radius, azimuths, s_max, built.sigma_um, built.band_per_um)

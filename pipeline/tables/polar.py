@@ -1,0 +1,66 @@
+"""The polar table: XYZ of |P|^2 on rings and azimuths, Chebyshev polynomials in |w|, cubic splines between texels.
+
+XYZ / (C cos ti) = sum_k T_k(2 |w| / w_max - 1) table[ring, channel, k, azimuth],   w_max = sqrt(4 - rho^2)
+
+where `table` is looked up by bicubic B-splines. On the disc of a ring w reaches no further than w_max, for
+(u, v, w) is the sum of two unit vectors.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import polar
+from kernels.polar import RingQuadratures
+from pipeline.optics.geometry import Array
+from pipeline.spectrum import PolarSpectrum
+from pipeline.tables.polar_grid import PolarGrid, Rings
+
+# at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
+_LEAST_W2 = 1e-9
+
+
+@dataclass(frozen=True)
+class PolarTable:
+    """B-spline coefficients on a polar grid.
+
+    values: float32 (rings, 3, w terms, azimuths): X, Y, Z; Chebyshev terms of |w|.
+    """
+
+    values: NDArray[np.float32]
+    grid: PolarGrid
+
+    @property
+    def w_terms(self) -> int:
+        return int(self.values.shape[2])
+
+
+def build(spectrum: PolarSpectrum, rings: Rings, quadratures: RingQuadratures, w_terms: int) -> PolarTable:
+    """The table of a power spectrum under one light, observer and material, as its quadratures hold them."""
+    samples = polar.integrate(
+        spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um, rings.rho(), quadratures, w_terms
+    )
+    values = polar.spline_coefficients(samples)
+    shape = (rings.count, 3, w_terms, spectrum.azimuths.count)
+    return PolarTable(values.reshape(shape), PolarGrid(rings, spectrum.azimuths))
+
+
+def w_position(rho: Array, w: Array) -> Array:
+    """x = 2 |w| / w_max - 1 in [-1, 1]."""
+    w_max = np.sqrt(np.maximum(4.0 - rho**2, _LEAST_W2))
+    return np.asarray(np.clip(2.0 * np.abs(w) / w_max - 1.0, -1.0, 1.0))
+
+
+def look_up(table: PolarTable, uvw: Array) -> Array:
+    """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the grid's rings."""
+    rings, azimuths = table.grid.rings, table.grid.azimuths
+    rho = np.hypot(uvw[:, 0], uvw[:, 1])
+    ring = rings.index(rho)
+    # rounding may carry a direction of the rim itself past the last ring
+    inside = ring <= rings.count - 1 + 1e-6
+    place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
+    flat = table.values.reshape(rings.count, -1, azimuths.count)
+    found = polar.look_up(flat, *place).astype(np.float64)
+    found[~inside] = np.nan
+    return found

@@ -1,0 +1,83 @@
+"""Wavelengths of the spectral integral, chosen ring by ring from an estimate of the error they leave.
+
+|P|^2 along a ray is a Fourier integral over the coherence window's autocorrelation, exp(-x^2 / (4 sigma^2)): at a ring rho
+a rule with weights q_l answers each e^(2 pi i x / lambda rho) with D(x rho) = sum_l q_l e^(2 pi i x rho / lambda_l). In speckle
+all x within the window carry independent amplitudes, so the relative error of the integral is the root mean square
+of D's error over the window. Large rings need fine steps, rings near the mirror direction few wavelengths.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kernels.polar import RingQuadratures
+from pipeline.errors import AccuracyError
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature
+
+_STEPS_NM = (20.0, 10.0, 5.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
+# the window's autocorrelation squared, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
+_REACH_SIGMAS, _POINTS = 4.0, 48
+_GRID_POINTS = 256
+
+
+def choose(
+    integrand: Callable[[float], Quadrature], rho: Array, sigma_um: float, tolerance: float
+) -> RingQuadratures:
+    """The coarsest rule for every ring whose estimated relative error is below `tolerance`.
+
+    `integrand` gives the quadrature of a step in nm (one wavelength, whatever the step, for a laser line).
+    Raises AccuracyError where even the finest step would err by more.
+    """
+    coarse = integrand(_STEPS_NM[0])
+    if len(coarse.lambda_nm) == 1:
+        return _assemble([coarse], np.zeros(len(rho), int))
+    x = np.linspace(0.0, _REACH_SIGMAS * sigma_um, _POINTS)
+    share = np.exp(-0.5 * (x / sigma_um) ** 2)
+    share /= share.sum()
+    y = np.linspace(0.0, x[-1] * rho[-1], _points(x[-1] * rho[-1], coarse))
+    chosen, rules = np.full(len(rho), -1), [coarse]
+    response = _response(coarse, y)
+    for finer in (integrand(step) for step in _STEPS_NM[1:]):
+        response_finer = _response(finer, y)
+        error = np.max(np.abs(response - response_finer) ** 2, axis=1)
+        left = np.sqrt(np.interp(np.outer(rho, x), y, error) @ share)
+        chosen[(chosen < 0) & (left <= tolerance)] = len(rules) - 1
+        if np.all(chosen >= 0):
+            return _assemble(rules, chosen)
+        rules.append(finer)
+        response = response_finer
+    raise AccuracyError(
+        f"the spectrum's lines need wavelengths closer than {_STEPS_NM[-2]} nm for an error of {tolerance:.1g}; "
+        "raise accuracy.delta_e, or narrow spectrum.range_nm"
+    )
+
+
+def _points(y_max: float, rule: Quadrature) -> int:
+    """Samples of D over [0, y_max] that follow its fastest beat, between the two ends of the spectrum."""
+    beat = 1e3 / rule.lambda_nm[0] - 1e3 / rule.lambda_nm[-1]
+    return max(_GRID_POINTS, int(1.5 * beat * y_max))
+
+
+def _response(rule: Quadrature, y: Array) -> Array:
+    """D(y) of X, Y, Z (len(y), 3), over each channel's own integral."""
+    turns = np.outer(y, 1e3 / rule.lambda_nm)
+    # whole turns go first: what is left keeps its digits in single precision, which is twice as fast
+    turns -= np.rint(turns)
+    phase = np.exp(np.complex64(2j * np.pi) * turns.astype(np.float32))
+    # a channel that sees nothing has no error either
+    total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
+    return np.asarray(phase @ (rule.weights / total))
+
+
+def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:
+    used = sorted(set(chosen.tolist()))
+    count = np.array([len(rules[k].lambda_nm) for k in used])
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    place = np.searchsorted(used, chosen)
+    return RingQuadratures(
+        1e-3 * np.concatenate([rules[k].lambda_nm for k in used]),
+        np.concatenate([rules[k].weights for k in used]),
+        first[place],
+        count[place],
+    )
