@@ -25,7 +25,7 @@ $(VENV)/ready: pyproject.toml requirements.lock
 		{ echo "error: Python 3.11 or newer is needed; name one with make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
-		--constraint requirements.lock --editable '.[readers,dev]'
+		--constraint requirements.lock --editable '.[readers,bench,dev]'
 	touch $@
 
 # A device counts when a kernel was built and run on it; `doctor` exits with 5 where none does.

@@ -44,7 +44,7 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
     from pipeline.evaluate import table_evaluator
     from pipeline.stages import table
 
-    return table_evaluator(table.load(artifact), config, progress)
+    return table_evaluator(table.load(config, artifact), config, progress)
 
 
 def refuse_unreached(xyz: Any, what: str, source: str) -> None:

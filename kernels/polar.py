@@ -123,9 +123,7 @@ def integrate(
     )
     out = np.empty((len(rho), outputs, LANES * tiles), np.float32)
     power, result = device.shared(spectrum), device.shared(out)
-    program.launch(
-        "apply_operator", (len(rho), tiles, groups), power, np.int32(radii), extents, matrix, result
-    )
+    program.launch("apply_operator", (len(rho), tiles, groups), power, np.int32(radii), extents, matrix, result)
     return device.settle(result, out)
 
 

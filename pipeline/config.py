@@ -5,10 +5,11 @@ fault of a file before it raises, each with its key path; what ties sections tog
 each of them is sound.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ValidationInfo,
@@ -277,14 +278,25 @@ class Material(Section):
         return value
 
 
+FINE_STEP_NM = 1.0
 # an error of a tenth is no digit at all
 LARGEST_TOLERANCE = 0.1
 
 
-class Table(Section):
+class PolarLayout(Section):
+    """Rings and azimuths of splines, Chebyshev polynomials in |w|; what is "auto" follows from [accuracy]."""
+
+    layout: Literal["polar"] = "polar"
+    terms: Literal["auto"] | Annotated[int, Field(ge=2, le=1000)] = "auto"
+    rings: Literal["auto"] | Annotated[int, Field(ge=8, le=4096)] = "auto"
+    azimuths: Literal["auto"] | Annotated[int, Field(ge=32, le=32768, multiple_of=32)] = "auto"
+    w_terms: Literal["auto"] | Annotated[int, Field(ge=4, le=128, multiple_of=4)] = "auto"
+
+
+class TaylorLayout(Section):
     """The paper's table: I_p on `resolution` x `resolution` nodes 2 |t|^power sign(t)."""
 
-    layout: Literal["taylor"] = "taylor"
+    layout: Literal["taylor"]
     resolution: Annotated[int, Field(ge=3, le=4001)] = 501
     power: Annotated[float, Field(ge=1, le=9)] = 5.0
     terms: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = "auto"
@@ -299,10 +311,24 @@ class Table(Section):
         return value
 
 
-class Accuracy(Section):
-    """The error budget: mean CIELAB error of BRDF maps at one exposure. Without `delta_e`, none is set."""
+def _default_layout(table: Any) -> Any:
+    """A [table] that names no layout is polar."""
+    return {"layout": "polar", **table} if isinstance(table, dict) else table
 
-    delta_e: Positive | None = None
+
+Table = Annotated[
+    Annotated[PolarLayout | TaylorLayout, Field(discriminator="layout")], BeforeValidator(_default_layout)
+]
+
+
+# what a polar table is planned for where no budget is set
+DEFAULT_DELTA_E = 0.1
+
+
+class Accuracy(Section):
+    """The error budget: mean CIELAB error at one exposure. A polar table is planned for it, and for 0.1 without one."""
+
+    delta_e: Annotated[float, Field(ge=1e-3, le=100)] | None = None
     exposure_ru: Positive = 7500.0
 
 
@@ -356,11 +382,21 @@ class Config(Section):
     coherence: Coherence = Coherence()
     spectrum: Spectrum = Spectrum()
     material: Material = Material()
-    table: Table = Table()
+    table: Table = PolarLayout()
     accuracy: Accuracy = Accuracy()
     scene: Scene | None = None
     render: Render = Render()
     publish: Publish = Publish()
+
+    @property
+    def budget_delta_e(self) -> float:
+        """The mean CIELAB error that a polar table is planned for."""
+        return DEFAULT_DELTA_E if self.accuracy.delta_e is None else self.accuracy.delta_e
+
+    @property
+    def mean_step_nm(self) -> float:
+        """The wavelength step of means that stand outside the spectral integral, such as a metal's luminous mean."""
+        return self.table.step_nm if isinstance(self.table, TaylorLayout) else FINE_STEP_NM
 
     @model_validator(mode="after")
     def maps_show_the_scene(self) -> Self:

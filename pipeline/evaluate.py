@@ -10,16 +10,18 @@ from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress, silent
-from pipeline.tables import taylor
+from pipeline.tables import polar, taylor
+from pipeline.tables.polar import PolarTable
+from pipeline.tables.taylor import TaylorTable
 
 # XYZ (directions, 3) under 1 RU for wi, wr (directions, 3)
 Evaluator = Callable[[Array, Array], Array]
 _AT_ONCE = 16384
 
 
-def table_evaluator(table: taylor.TaylorTable, config: Config, progress: Progress = silent) -> Evaluator:
-    """XYZ = C cos(ti) sum_p w^p I_p(u, v), [D14] eq. 10; NaN where the table's scene does not reach."""
-    quadrature = trapezoid(config.spectrum, config.table.step_nm)
+def table_evaluator(table: PolarTable | TaylorTable, config: Config, progress: Progress = silent) -> Evaluator:
+    """XYZ = C cos(ti) times what the table holds; NaN where the table's scene does not reach."""
+    quadrature = trapezoid(config.spectrum, config.mean_step_nm)
 
     def evaluate(wi: Array, wr: Array) -> Array:
         factor = brdf.direction_factor(config.material, quadrature, wi, wr)
@@ -27,16 +29,20 @@ def table_evaluator(table: taylor.TaylorTable, config: Config, progress: Progres
         out = np.empty((len(wr), 3))
         for first in range(0, len(wr), _AT_ONCE):
             part = np.s_[first : first + _AT_ONCE]
-            out[part] = factor[part, None] * taylor.look_up(table, uvw[part])
+            out[part] = factor[part, None] * _look_up(table, uvw[part])
             progress("look-up", min(1.0, (first + _AT_ONCE) / len(wr)))
         return out
 
     return evaluate
 
 
+def _look_up(table: PolarTable | TaylorTable, uvw: Array) -> Array:
+    return polar.look_up(table, uvw) if isinstance(table, PolarTable) else taylor.look_up(table, uvw)
+
+
 def relative_unit(config: Config) -> float:
     """Y of 1 RU in a config's normalisation: what exposures are multiples of."""
-    quadrature = trapezoid(config.spectrum, config.table.step_nm)
+    quadrature = trapezoid(config.spectrum, config.mean_step_nm)
     return brdf.relative_unit(config.material, quadrature, config.coherence.sigma_um)
 
 

@@ -18,7 +18,7 @@ def check(config: Config, source: str) -> None:
     if config.spectrum == Spectrum() and config.material.metal == "Au":
         return
     try:
-        quadrature = trapezoid(config.spectrum, config.table.step_nm)
+        quadrature = trapezoid(config.spectrum, config.mean_step_nm)
     except BakeError as error:
         raise ConfigError(source, [("spectrum", str(error))]) from None
     try:

@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels import diffraction
 from pipeline import series, stack
-from pipeline.config import Config, Material, Spectrum
+from pipeline.config import FINE_STEP_NM, Config, Material, Spectrum
 from pipeline.device_stack import upload
 from pipeline.evaluate import Evaluator
 from pipeline.optics import brdf, geometry
@@ -25,7 +25,7 @@ from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm, trapezoi
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
-STEP_NM = 1.0
+STEP_NM = FINE_STEP_NM
 # in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11, at half the time
 _TOLERANCE = 2e-11
 _DIRECTIONS_AT_ONCE = 2048

@@ -6,20 +6,26 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipeline import provenance
-from pipeline.config import Config
+from pipeline.config import Config, PolarLayout
 from pipeline.device_stack import require_device
 from pipeline.progress import Progress, silent
+from pipeline.stages import table
 from pipeline.stages.render import RENDER
 from pipeline.stages.stack import STACK
 from pipeline.stages.stage import Stage
 from pipeline.stages.surface import SURFACE
-from pipeline.stages.table import TABLE
+from pipeline.stages.spectrum import SPECTRUM
 from pipeline.stages.validate import VALIDATE
 from pipeline.store import Artifact, Store
 
-STAGES = (SURFACE, STACK, TABLE, RENDER, VALIDATE)
 UNCHANGED = "nothing it reads has changed"
-_ON_DEVICE = {"table", "validate"}
+_ON_DEVICE = {"spectrum", "table", "render", "validate"}
+
+
+def stages(config: Config) -> tuple[Stage, ...]:
+    """Every stage of a config, in order: a table of either layout is made of its own spectrum of the surface."""
+    before = SPECTRUM if isinstance(config.table, PolarLayout) else STACK
+    return (SURFACE, before, table.stage_of(config), RENDER, VALIDATE)
 
 
 @dataclass(frozen=True)
@@ -42,9 +48,10 @@ class Explanation:
 def plan(config: Config, store: Store, until: str = "validate") -> list[Step]:
     """The steps up to and including stage `until`, each cached or to do. Writes nothing."""
     keys: dict[str, str] = {}
-    for stage in _needed(until):
+    needed = _needed(config, until)
+    for stage in needed:
         keys[stage.name] = stage.key(config, keys)
-    return [Step(stage, keys[stage.name], store.has(stage.name, keys[stage.name])) for stage in _needed(until)]
+    return [Step(stage, keys[stage.name], store.has(stage.name, keys[stage.name])) for stage in needed]
 
 
 def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
@@ -59,16 +66,16 @@ def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation
     return told
 
 
-def _needed(until: str) -> list[Stage]:
+def _needed(config: Config, until: str) -> list[Stage]:
     """The stages that `until` needs, in order, itself last."""
-    by_name = {stage.name: stage for stage in STAGES}
+    by_name = {stage.name: stage for stage in stages(config)}
     wanted, queue = {until}, [until]
     while queue:
         for name in by_name[queue.pop()].inputs:
             if name not in wanted:
                 wanted.add(name)
                 queue.append(name)
-    return [stage for stage in STAGES if stage.name in wanted]
+    return [stage for stage in stages(config) if stage.name in wanted]
 
 
 def execute(
@@ -156,7 +163,8 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
 def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
     """The work in the stage's own units, and how long it took the last time."""
     texts = {
-        "table": f"{config.table.resolution}² nodes x {config.table.step_nm:g} nm steps",
+        "spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
+        "table": table.size_of(config),
         "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
         "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",
     }

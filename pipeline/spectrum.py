@@ -65,22 +65,41 @@ def radii(sigma_um: float, r_max_per_um: float) -> Array:
 
 
 def chebyshev_stack(
-    field: HeightField, sigma_um: float, r_max_per_um: float, terms: int, tolerance: float, progress: Progress = silent
+    field: HeightField,
+    sigma_um: float,
+    r_max_per_um: float,
+    terms: int,
+    tolerance: float,
+    progress: Progress = silent,
 ) -> stack.Stack:
     """The float32 stack that E up to `r_max_per_um` gathers from."""
     reach = float(radii(sigma_um, r_max_per_um)[-1])
     return stack.build(field, "chebyshev", terms, sigma_um, reach, tolerance, progress, np.float32)
 
 
+def s_max(lambda_min_nm: float) -> float:
+    """The largest s = k |w|: |w| = 2 at the shortest wavelength, 1/um."""
+    return 2.0 * pi * series.W_MAX / (1e-3 * lambda_min_nm)
+
+
+def gather(
+    built: stack.Stack, half_turn: Array, lambda_min_nm: float, r_max_per_um: float, nodes: int
+) -> NDArray[np.float32]:
+    """E (tiles, radii, nodes, 16) at azimuths of half a turn (radians, a multiple of 16), then at their opposites.
+
+    Raises DeviceError where no device works.
+    """
+    n = np.arange(built.terms)[:, None]
+    # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
+    phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
+    bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
+    return polar.polar_spectrum(upload(built), radii(built.sigma_um, r_max_per_um), half_turn, bessel)
+
+
 def build(
     built: stack.Stack, azimuths: Azimuths, lambda_min_nm: float, r_max_per_um: float, nodes: int
 ) -> PolarSpectrum:
-    """E of a Chebyshev stack; s reaches the shortest wavelength at |w| = 2. Raises DeviceError without a device."""
-    s_max = 2.0 * pi * series.W_MAX / (1e-3 * lambda_min_nm)
+    """E of a Chebyshev stack on given azimuths; s reaches the shortest wavelength at |w| = 2."""
+    values = gather(built, azimuths.angles()[: azimuths.count // 2], lambda_min_nm, r_max_per_um, nodes)
     radius = radii(built.sigma_um, r_max_per_um)
-    n = np.arange(built.terms)[:, None]
-    # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
-    bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, s_nodes(nodes, s_max) * built.half_range_um)
-    half_turn = azimuths.angles()[: azimuths.count // 2]
-    values = polar.polar_spectrum(upload(built), radius, half_turn, bessel)
-    return PolarSpectrum(values, radius, azimuths, s_max, built.sigma_um, built.band_per_um)
+    return PolarSpectrum(values, radius, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um)

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline import stack as dft_stack
 from pipeline.config import Config
+from pipeline.directions import random_pairs
 from pipeline.errors import AccuracyError
 from pipeline.evaluate import Evaluator, Map, relative_unit, table_evaluator
 from pipeline.optics import brdf, geometry
@@ -42,29 +43,14 @@ def relative_error(values: Array, reference: Array, floor: float) -> RelativeErr
     return RelativeError(float(np.median(error)), float(np.percentile(error, 99)), float(error.max()))
 
 
-def random_pairs(config: Config, count: int, seed: int = _SEED) -> tuple[Array, Array]:
-    """Pairs of directions (count, 3) uniform over the projected hemisphere, or over the scene's lights and views."""
-    rng = np.random.default_rng(seed)
-    theta_max = 90.0 if config.scene is None else config.scene.views.theta_max_deg
-    # the rim itself is left out: cos -> 0 there
-    widest = np.sin(np.radians(min(theta_max, 88.0)))
-    wr = geometry.direction(np.arcsin(widest * np.sqrt(rng.random(count))), 2 * np.pi * rng.random(count))
-    if config.scene is None:
-        wi = geometry.direction(np.arcsin(widest * np.sqrt(rng.random(count))), 2 * np.pi * rng.random(count))
-    else:
-        lights = [geometry.direction(*np.radians([s.theta_deg, s.phi_deg])) for s in config.scene.lights]
-        wi = np.array(lights)[rng.integers(len(lights), size=count)]
-    return wi, wr
-
-
 def _integrand(config: Config, step_nm: float) -> Quadrature:
     return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
 def mirror_luminance(config: Config, wi: Array, wr: Array) -> Array:
     """Y (directions,) that |P|^2 = 1 at every wavelength would give at these directions."""
-    plain = trapezoid(config.spectrum, config.table.step_nm)
-    inside = _integrand(config, config.table.step_nm).weights[:, 1].sum()
+    plain = trapezoid(config.spectrum, config.mean_step_nm)
+    inside = _integrand(config, config.mean_step_nm).weights[:, 1].sum()
     return brdf.direction_factor(config.material, plain, wi, wr) * float(inside)
 
 
@@ -86,7 +72,7 @@ def check_random(
     evaluate: Evaluator, reference: Reference, config: Config, progress: Progress = silent
 ) -> RandomCheck:
     """The table (`evaluate`) against the reference on directions it was not made for."""
-    wi, wr = random_pairs(config, RANDOM_DIRECTIONS)
+    wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
     truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
     # over a mirror's Y what is left is |P|^2
@@ -132,7 +118,7 @@ def check_reference(field: HeightField, reference: Reference, config: Config, di
 
     Raises AccuracyError where they differ: then nothing measured against the reference means anything.
     """
-    wi, wr = random_pairs(config, directions, seed=_SEED + 1)
+    wi, wr = random_pairs(config.scene, directions, _SEED + 1)
     # the mirror direction is within every scan's band
     uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -1.5]]])
     nodes = trapezoid(config.spectrum, 100.0).lambda_nm[:3]

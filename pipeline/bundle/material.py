@@ -94,7 +94,7 @@ def medium(config: Config) -> Medium | None:
     if config.material.fresnel == "dielectric":
         return Medium(None, np.array([config.material.ior], dtype=complex), np.ones(1))
     if config.material.fresnel == "conductor":
-        quadrature = trapezoid(config.spectrum, config.table.step_nm)
+        quadrature = trapezoid(config.spectrum, config.mean_step_nm)
         index = fresnel.metal_index(config.material.metal, quadrature.lambda_nm)
         return Medium(quadrature.lambda_nm, index, quadrature.weights[:, 1])
     return None

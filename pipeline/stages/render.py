@@ -40,7 +40,7 @@ def map_radius(config: Config) -> float:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    evaluate = table_evaluator(table.load(inputs["table"]), config)
+    evaluate = table_evaluator(table.load(config, inputs["table"]), config)
     views, unit = Map(config.render.size, map_radius(config)), relative_unit(config)
     maps = []
     for i, light in enumerate(config.render.lights):

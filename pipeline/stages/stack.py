@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline import arrays, series
 from pipeline import stack as dft_stack
-from pipeline.config import Config
+from pipeline.config import Config, TaylorLayout
 from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress
 from pipeline.stages import surface
@@ -17,8 +17,14 @@ from pipeline.store import Artifact
 _FILE = "stack.zarr"
 
 
+def layout_of(config: Config) -> TaylorLayout:
+    """The [table] section of a config whose stages are the paper's."""
+    assert isinstance(config.table, TaylorLayout)
+    return config.table
+
+
 def _parameters(config: Config) -> dict[str, Any]:
-    table = config.table
+    table = layout_of(config)
     return {
         "spectrum": spectrum_parameters(config),
         "sigma_um": config.coherence.sigma_um,
@@ -30,16 +36,17 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     field = surface.load(inputs["surface"])
-    quadrature = trapezoid(config.spectrum, config.table.step_nm)
-    order = None if config.table.terms == "auto" else config.table.terms
-    plan = series.plan_taylor(field, quadrature, config.table.tolerance, order)
+    table = layout_of(config)
+    quadrature = trapezoid(config.spectrum, table.step_nm)
+    order = None if table.terms == "auto" else table.terms
+    plan = series.plan_taylor(field, quadrature, table.tolerance, order)
     built = dft_stack.build(
         field,
         "taylor",
         plan.order + 1,
         config.coherence.sigma_um,
         series.W_MAX / (1e-3 * quadrature.lambda_min_nm),
-        dft_stack.window_tolerance(config.table.tolerance),
+        dft_stack.window_tolerance(table.tolerance),
         progress,
     )
     _save(built, folder / _FILE)

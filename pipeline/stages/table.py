@@ -1,67 +1,26 @@
-"""Table: Taylor stack, light and material -> I_p(u, v) in X, Y and Z."""
+"""The table stage of either layout: one name, one place in the order."""
 
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-
-from pipeline import arrays
-from pipeline.config import Config
-from pipeline.device_stack import kernel_digest
-from pipeline.optics import brdf
-from pipeline.progress import Progress
-from pipeline.stages import stack
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.config import Config, PolarLayout
+from pipeline.stages import polar_table, taylor_table
+from pipeline.stages.stage import Stage
 from pipeline.store import Artifact
-from pipeline.tables import grid, taylor
-
-_FILE = "table.zarr"
-
-
-def _parameters(config: Config) -> dict[str, Any]:
-    material = material_parameters(config)
-    return {
-        "kernel": kernel_digest("taylor_table.cl"),
-        "spectrum": spectrum_parameters(config),
-        # angles stay outside the table: only what varies with wavelength enters
-        "material": {key: material[key] for key in ("normalisation", "metal")},
-        "table": config.table.model_dump(mode="json"),
-        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
-    }
+from pipeline.tables.polar import PolarTable
+from pipeline.tables.taylor import TaylorTable
 
 
-def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    built = stack.load(inputs["stack"])
-    quadrature = brdf.integrand(config.material, config.spectrum, config.table.step_nm, config.coherence.sigma_um)
-    table = taylor.build(built, quadrature, config.table.resolution, config.table.power, config.scene, progress)
-    nodes = grid.nodes(table.resolution, table.power)
-    arrays.save(
-        folder / _FILE,
-        {
-            "I_p": arrays.Named(table.values, ("v", "u", "channel", "p"), "1"),
-            "computed": arrays.Named(table.computed, ("v", "u"), "1"),
-            "unknown": arrays.Named(table.unknown, ("v", "u"), "1"),
-            "u": arrays.Named(nodes, ("u",), "1"),
-            "v": arrays.Named(nodes, ("v",), "1"),
-        },
-        {"power": table.power, "channels": ["X", "Y", "Z"]},
-    )
-    inside = np.hypot(nodes[:, None], nodes) <= grid.U_MAX
-    return {
-        "resolution": table.resolution,
-        "power": table.power,
-        "powers_of_w": int(table.values.shape[3]),
-        "wavelengths": len(quadrature.lambda_nm),
-        "unknown_share": table.unknown_share,
-        "skipped_share": float(1.0 - np.mean(table.computed[inside])),
-    }
+def stage_of(config: Config) -> Stage:
+    """The table stage that a config's layout asks for."""
+    return polar_table.TABLE if isinstance(config.table, PolarLayout) else taylor_table.TABLE
 
 
-def load(artifact: Artifact) -> taylor.TaylorTable:
-    """The table of a table artifact."""
-    zarr = artifact.folder / _FILE
-    values, computed, unknown = (arrays.load(zarr, name) for name in ("I_p", "computed", "unknown"))
-    return taylor.TaylorTable(values, computed, unknown, float(arrays.attributes(zarr)["power"]))
+def load(config: Config, artifact: Artifact) -> PolarTable | TaylorTable:
+    """The table of a table artifact made for this config."""
+    return polar_table.load(artifact) if isinstance(config.table, PolarLayout) else taylor_table.load(artifact)
 
 
-TABLE = Stage("table", 1, ("stack",), _parameters, _produce)
+def size_of(config: Config) -> str:
+    """How large a table will be, in words."""
+    section = config.table
+    if isinstance(section, PolarLayout):
+        return f"{section.rings} rings x {section.azimuths} azimuths"
+    return f"{section.resolution}² nodes x {section.step_nm:g} nm steps"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from kernels import polar
 from kernels.polar import RingQuadratures
 from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature
 from pipeline.spectrum import PolarSpectrum
 from pipeline.tables.polar_grid import PolarGrid, Rings
 
@@ -64,3 +65,17 @@ def look_up(table: PolarTable, uvw: Array) -> Array:
     found = polar.look_up(flat, *place).astype(np.float64)
     found[~inside] = np.nan
     return found
+
+
+def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quadrature) -> float:
+    """Share of the light (Y weights), over the grid's disc, whose frequencies lie beyond the scan's band."""
+    rho, phi = grid.rings.rho(), grid.azimuths.angles()
+    area = np.outer(rho * np.gradient(rho), np.abs(np.gradient(np.unwrap(phi))))
+    # along each direction the band ends at r = reach, so all wavelengths shorter than rho / reach are lost
+    reach = np.minimum(
+        band_per_um[0] / np.maximum(np.abs(np.cos(phi)), 1e-12),
+        band_per_um[1] / np.maximum(np.abs(np.sin(phi)), 1e-12),
+    )
+    shorter = np.concatenate([[0.0], np.cumsum(np.abs(light.weights[:, 1]))])
+    lost = np.searchsorted(light.lambda_nm, 1e3 * rho[:, None] / reach, side="left")
+    return float(np.sum(area * shorter[lost] / shorter[-1]) / np.sum(area))

@@ -1,0 +1,84 @@
+"""Table: power spectrum, light and material -> the polar table of XYZ, with its certificate."""
+
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import arrays, certificate
+from pipeline.config import Config
+from pipeline.device_stack import kernel_digest
+from pipeline.evaluate import table_evaluator
+from pipeline.optics import brdf
+from pipeline.progress import Progress
+from pipeline.stages import spectrum, surface
+from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.store import Artifact
+from pipeline.tables import polar, quadrature
+from pipeline.tables.polar_grid import Azimuths, PolarGrid, Rings
+
+_FILE = "table.zarr"
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    return {
+        "kernels": [*spectrum.planning_kernels(), kernel_digest("power_spectrum.cl")],
+        "spectrum": spectrum_parameters(config),
+        # the certificate is over colours, so all of the material counts
+        "material": material_parameters(config),
+        "accuracy": config.accuracy.model_dump(mode="json"),
+    }
+
+
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    power = spectrum.load(inputs["spectrum"])
+    plan = spectrum.planned(inputs["spectrum"])
+    light = partial(_integrand, config)
+    budget = spectrum.budget(config)
+    rules = quadrature.choose(light, plan.rings.rho(), config.coherence.sigma_um, budget.quadrature)
+    table = polar.build(power, plan.rings, rules, plan.w_terms)
+    progress("table", 1.0)
+    unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
+    certified = certificate.certify(table_evaluator(table, config), surface.load(inputs["surface"]), config, progress)
+    arrays.save(
+        folder / _FILE,
+        {
+            "table": arrays.Named(table.values, ("rho", "channel", "w_term", "phi"), "1"),
+            "rho": arrays.Named(table.grid.rings.rho(), ("rho",), "1"),
+            "phi": arrays.Named(np.degrees(table.grid.azimuths.angles()), ("phi",), "degree"),
+            "wavelengths": arrays.Named(rules.count, ("rho",), "1"),
+        },
+        {
+            "rings": asdict(table.grid.rings),
+            "azimuths": asdict(table.grid.azimuths),
+            "channels": ["X", "Y", "Z"],
+        },
+    )
+    return {
+        "layout": "polar",
+        "rings": asdict(table.grid.rings),
+        "azimuths": asdict(table.grid.azimuths),
+        "w_terms": table.w_terms,
+        "wavelengths": int(rules.count.max()),
+        "wavelengths_mean": float(rules.count.mean()),
+        "unknown_share": unknown,
+        "skipped_share": 1.0 - (table.grid.rings.rho_max / 2.0) ** 2,
+        "certificate": asdict(certified),
+    }
+
+
+def _integrand(config: Config, step_nm: float) -> Any:
+    return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
+
+
+def load(artifact: Artifact) -> polar.PolarTable:
+    """The table of a polar table artifact."""
+    zarr = artifact.folder / _FILE
+    found = arrays.attributes(zarr)
+    grid = PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
+    return polar.PolarTable(arrays.load(zarr, "table"), grid)
+
+
+TABLE = Stage("table", 1, ("surface", "spectrum"), _parameters, _produce)

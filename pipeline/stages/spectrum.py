@@ -1,0 +1,106 @@
+"""Spectrum: height field -> the polar power spectrum E(r, phi, s), which knows no illuminant and no observer."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kernels import device
+from pipeline import arrays, digest, spectrum
+from pipeline.config import Config, LaserLine, PolarLayout
+from pipeline.device_stack import kernel_digest
+from pipeline.progress import Progress
+from pipeline.stages import surface
+from pipeline.stages.stage import Inputs, Stage, Summary
+from pipeline.store import Artifact
+from pipeline.tables import plan
+from pipeline.tables.polar_grid import Azimuths, Rings
+
+_FILE = "spectrum.zarr"
+
+
+def layout_of(config: Config) -> PolarLayout:
+    """The [table] section of a config whose stages are the polar ones."""
+    assert isinstance(config.table, PolarLayout)
+    return config.table
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    return {
+        "kernel": [kernel_digest("polar_spectrum.cl"), *planning_kernels()],
+        "sigma_um": config.coherence.sigma_um,
+        "wavelengths": _wavelengths(config),
+        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+        "table": layout_of(config).model_dump(mode="json"),
+        "delta_e": config.budget_delta_e,
+        "exposure_ru": config.accuracy.exposure_ru,
+    }
+
+
+def planning_kernels() -> list[str]:
+    """Digests of the kernels that make tables of a spectrum: the plan measures with them."""
+    return [digest.of_json(device.source(name)) for name in ("spectral_operator.cl", "cubic_spline.cl")]
+
+
+def _wavelengths(config: Config) -> dict[str, Any]:
+    """A line or a range: all that a spectrum has to do with light."""
+    light = config.spectrum
+    if isinstance(light.illuminant, LaserLine):
+        return light.illuminant.model_dump()
+    return {"range_nm": list(light.range_nm)}
+
+
+def budget(config: Config) -> plan.Budget:
+    """What a config's tables are planned for."""
+    return plan.Budget(config.budget_delta_e, config.accuracy.exposure_ru)
+
+
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    field = surface.load(inputs["surface"])
+    light = config.spectrum
+    built, chosen = plan.make(
+        field, config.coherence.sigma_um, light, config.scene, budget(config), layout_of(config), progress
+    )
+    arrays.save(
+        folder / _FILE,
+        {
+            "E": arrays.Named(built.values, ("tile", "r", "s", "lane"), "1"),
+            "phi": arrays.Named(
+                np.degrees(built.azimuths.angles()).reshape(-1, built.values.shape[3]), ("tile", "lane"), "degree"
+            ),
+            "r": arrays.Named(built.radius_per_um, ("r",), "1/um"),
+            "s": arrays.Named(built.s_per_um, ("s",), "1/um"),
+        },
+        {
+            "azimuths": asdict(built.azimuths),
+            "s_max_per_um": built.s_max_per_um,
+            "sigma_um": built.sigma_um,
+            "band_per_um": list(built.band_per_um),
+        },
+    )
+    return {**asdict(chosen), "radii": len(built.radius_per_um), "bytes": built.values.nbytes}
+
+
+def planned(artifact: Artifact) -> plan.Plan:
+    """The plan that a spectrum artifact was made by."""
+    found = {key: artifact.summary[key] for key in ("terms", "s_nodes", "w_terms", "probed_delta_e")}
+    azimuths, rings = Azimuths(**artifact.summary["azimuths"]), Rings(**artifact.summary["rings"])
+    return plan.Plan(azimuths=azimuths, rings=rings, **found)
+
+
+def load(artifact: Artifact) -> spectrum.PolarSpectrum:
+    """The power spectrum of a spectrum artifact."""
+    zarr = artifact.folder / _FILE
+    found = arrays.attributes(zarr)
+    return spectrum.PolarSpectrum(
+        arrays.load(zarr, "E"),
+        arrays.load(zarr, "r"),
+        Azimuths(**found["azimuths"]),
+        found["s_max_per_um"],
+        found["sigma_um"],
+        tuple(found["band_per_um"]),
+    )
+
+
+SPECTRUM = Stage("spectrum", 1, ("surface",), _parameters, _produce)

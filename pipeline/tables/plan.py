@@ -1,0 +1,294 @@
+"""What a polar table is made of, chosen for an error budget: terms, nodes, rings, azimuths, quadrature.
+
+What a series needs follows from its tail: Bessel's functions bound Chebyshev's coefficients of every exponential
+(Jacobi-Anger). What the grid needs depends on the surface, so it is measured: three small tables beside probes that lie
+between their texels tell how the error falls with rings and with azimuths, and the product of both is made smallest.
+"""
+
+from dataclasses import dataclass
+from math import asinh, ceil, sqrt
+
+import numpy as np
+
+from kernels import polar as device
+from pipeline import series, spectrum, stack
+from pipeline.config import LaserLine, Material, PolarLayout, Scene, Spectrum
+from pipeline.directions import random_pairs
+from pipeline.errors import AccuracyError
+from pipeline.optics import brdf, geometry
+from pipeline.optics.colour_error import delta_e
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm, trapezoid
+from pipeline.progress import Progress, silent
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables import polar, quadrature
+from pipeline.tables.polar_grid import RHO_MAX, TILE, Azimuths, Rings
+
+# shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
+_AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
+_NODES_SHARE = 0.02  # of E, by its nodes in s
+_W_SHARE = 0.3  # of the table, by its terms in |w|
+_QUADRATURE_SHARE = 3e-3  # of each integral, by its wavelengths
+_GRID_SHARE = 0.8  # of the budget, by rings and azimuths as the probes see it
+_MOST_BYTES = 3 * 2**30
+# a start for the search: the grid that keeps 0.1 on snake scans at sigma = 16.25 um
+_BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0265, 0.1
+_LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 96, 4096, 32768
+_LEAST_STRETCH = 0.3
+_PROBE_RHOS, _PROBE_ANGLES = 48, 64
+_ROUNDS = 4
+_NEAR = 0.75  # of the target: near enough not to search on
+_SEED = 19991
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The mean CIELAB error allowed at an exposure."""
+
+    delta_e: float
+    exposure_ru: float
+
+    @property
+    def quadrature(self) -> float:
+        """Relative error that each ring's wavelengths may leave."""
+        return _QUADRATURE_SHARE * self.delta_e
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was chosen, and the mean error at the probes; None where no grid was searched for."""
+
+    terms: int
+    s_nodes: int
+    w_terms: int
+    azimuths: Azimuths
+    rings: Rings
+    probed_delta_e: float | None
+
+    @property
+    def texels(self) -> int:
+        return self.rings.count * self.azimuths.count
+
+
+def rho_max(scene: Scene | None) -> float:
+    """How far out in (u, v) a table must reach: |wi| + |wr| along the surface, 2 without a scene."""
+    if scene is None:
+        return RHO_MAX
+    view = np.sin(np.radians(scene.views.theta_max_deg))
+    return float(min(RHO_MAX, max(np.sin(np.radians(light.theta_deg)) for light in scene.lights) + view))
+
+
+def make(
+    field: HeightField,
+    sigma_um: float,
+    light: Spectrum,
+    scene: Scene | None,
+    budget: Budget,
+    layout: PolarLayout,
+    progress: Progress = silent,
+) -> tuple[spectrum.PolarSpectrum, Plan]:
+    """The power spectrum of a height field on the azimuths that the budget asks for, and the whole plan.
+
+    Of the light only its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of
+    reach or E would not fit into memory.
+    """
+    lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
+    z = series.largest_phase(field.half_range_um, lambda_min)
+    amplitude = _AMPLITUDE_SHARE * budget.delta_e
+    wanted = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
+    # whole vectors of terms cost the same and are shared with the device without a copy
+    terms = device.LANES * ceil(wanted / device.LANES)
+    nodes = series.chebyshev_order(z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
+    built = spectrum.chebyshev_stack(field, sigma_um, outer / (1e-3 * lambda_min), terms, amplitude, progress)
+    search = _Search(built, light, scene, budget, layout, nodes, z)
+    return search.run()
+
+
+class _Search:
+    """The search for the smallest grid."""
+
+    def __init__(
+        self,
+        built: stack.Stack,
+        light: Spectrum,
+        scene: Scene | None,
+        budget: Budget,
+        layout: PolarLayout,
+        nodes: int,
+        z: float,
+    ) -> None:
+        self._stack, self._budget, self._layout, self._nodes = built, budget, layout, nodes
+        self._lambda_min, self._rho_max = shortest_wavelength_nm(light), rho_max(scene)
+        self._r_max = self._rho_max / (1e-3 * self._lambda_min)
+        self._line = isinstance(light.illuminant, LaserLine)
+        # E serves every illuminant of a range: plan for equal energy
+        self._light = light if self._line else Spectrum(illuminant="E", range_nm=light.range_nm)
+        # |w| up to 2 spans half the phase that heights up and down do; the luminous middle counts, not the blue end
+        w_order = series.chebyshev_order(0.7 * z, min(0.1, _W_SHARE * budget.delta_e)) + 1
+        self._w_terms = 4 * ceil(w_order / 4) if layout.w_terms == "auto" else layout.w_terms
+        self._scene = scene
+        self._stretch, self._axis = anisotropy(built)
+        self._cache: dict[int, spectrum.PolarSpectrum] = {}
+        self._probes: _Probes | None = None
+
+    def run(self) -> tuple[spectrum.PolarSpectrum, Plan]:
+        rings, azimuths = self._start()
+        error = None
+        if "auto" in (self._layout.rings, self._layout.azimuths):
+            rings, azimuths, error = self._smallest(rings, azimuths)
+        made = self._spectrum(azimuths)
+        return made, Plan(self._stack.terms, self._nodes, self._w_terms, made.azimuths, self._rings(rings), error)
+
+    def _start(self) -> tuple[int, int]:
+        """Rings and azimuths to begin with: both follow the window, and the error falls with their square."""
+        finer = sqrt(_BASE_DELTA_E / self._budget.delta_e)
+        window = self._stack.sigma_um / _BASE_SIGMA_UM
+        x = asinh(self._rho_max / self._r0)
+        step = 0.5 * x / (self._r_max * 2.0 * np.pi * self._stack.sigma_um) if self._line else _BASE_RING_STEP
+        rings = int(np.clip(x / step * finer, _LEAST_RINGS, _MOST_RINGS))
+        azimuths = int(np.clip(_BASE_AZIMUTHS * window * finer, _LEAST_AZIMUTHS, _MOST_AZIMUTHS))
+        layout = self._layout
+        return (
+            rings if layout.rings == "auto" else layout.rings,
+            _whole_tiles(azimuths) if layout.azimuths == "auto" else layout.azimuths,
+        )
+
+    @property
+    def _r0(self) -> float:
+        """Rings are even where the specular lobe's width rules; under a laser line, everywhere."""
+        widest = 4.0 * self._rho_max
+        return widest if self._line else min(_BASE_R0 * _BASE_SIGMA_UM / self._stack.sigma_um, widest)
+
+    def _rings(self, count: int) -> Rings:
+        return Rings(count, self._r0, self._rho_max)
+
+    def _spectrum(self, azimuths: int) -> spectrum.PolarSpectrum:
+        if azimuths not in self._cache:
+            need = 4 * azimuths * self._nodes * len(spectrum.radii(self._stack.sigma_um, self._r_max))
+            if need > _MOST_BYTES:
+                raise AccuracyError(
+                    f"the power spectrum on {azimuths} azimuths and {self._nodes} nodes in s needs {need / 2**30:.1f} "
+                    f"GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller coherence.sigma_um, "
+                    "lower the heights or raise accuracy.delta_e."
+                )
+            self._cache = {azimuths: self._gather(Azimuths(azimuths, self._stretch, self._axis))}
+        return self._cache[azimuths]
+
+    def _gather(self, azimuths: Azimuths) -> spectrum.PolarSpectrum:
+        return spectrum.build(self._stack, azimuths, self._lambda_min, self._r_max, self._nodes)
+
+    def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
+        """Rings and azimuths whose error is within the budget at the least product, as far as a model tells."""
+        target = _GRID_SHARE * self._budget.delta_e
+        errors = {}
+
+        def error(r: int, a: int) -> float:
+            if (r, a) not in errors:
+                errors[r, a] = self._error(r, a)
+            return errors[r, a]
+
+        # e^2 = (rings' share) / rings^4 + (azimuths' share) / azimuths^4 + the rest, from three tables
+        fewer_rings, fewer_azimuths = max(8, 3 * rings // 4), _whole_tiles(3 * azimuths // 4)
+        here = error(rings, azimuths) ** 2
+        by_rings = max(error(fewer_rings, azimuths) ** 2 - here, 0.0) / (fewer_rings**-4.0 - rings**-4.0)
+        by_azimuths = max(error(rings, fewer_azimuths) ** 2 - here, 0.0) / (fewer_azimuths**-4.0 - azimuths**-4.0)
+        rest = max(here - by_rings * rings**-4.0 - by_azimuths * azimuths**-4.0, 0.0)
+        left = max(target**2 - rest, 0.25 * target**2)
+        for _ in range(_ROUNDS):
+            best = self._clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25)
+            if _NEAR * target <= error(*best) <= target:
+                break
+            left *= min(4.0, (0.9 * target / error(*best)) ** 2)
+        met = [pair for pair in errors if errors[pair] <= target]
+        best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(errors, key=errors.__getitem__)
+        return *best, errors[best]
+
+    def _clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
+        layout = self._layout
+        return (
+            int(np.clip(ceil(rings), _LEAST_RINGS, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
+            _whole_tiles(int(np.clip(azimuths, _LEAST_AZIMUTHS, _MOST_AZIMUTHS)))
+            if layout.azimuths == "auto"
+            else layout.azimuths,
+        )
+
+    def _error(self, rings: int, azimuths: int) -> float:
+        """Mean CIELAB error at the probes of a table of this size."""
+        if self._probes is None:
+            self._probes = _Probes(self)
+        made, grid = self._spectrum(azimuths), self._rings(rings)
+        quadratures = quadrature.choose(self.integrand, grid.rho(), self._stack.sigma_um, self._budget.quadrature)
+        return self._probes.error(polar.build(made, grid, quadratures, self._w_terms))
+
+    def integrand(self, step_nm: float) -> Quadrature:
+        """The probing light under a wavelength step."""
+        return brdf.integrand(Material(), self._light, step_nm, self._stack.sigma_um)
+
+    def probe(self) -> tuple[Array, Array, Array]:
+        """Probes' uvw and C cos ti (rhos, angles, ...), and the exact XYZ / (C cos ti) there.
+
+        Exact means: from E at the probes' own rings and azimuths, with spare terms in |w|. Angles are stratified over
+        half a turn and serve its other half as well; each ring's pairs keep their own w.
+        """
+        rng = np.random.default_rng(_SEED)
+        half = np.pi * (np.arange(_PROBE_ANGLES) + rng.random(_PROBE_ANGLES)) / _PROBE_ANGLES
+        angles = np.concatenate([half, half + np.pi])
+        wi, wr = random_pairs(self._scene, _PROBE_RHOS * len(angles), _SEED)
+        rho = np.hypot(*(geometry.uvw(wi, wr)[:, :2].T))
+        order = np.argsort(rho).reshape(_PROBE_RHOS, len(angles))
+        middle = np.minimum(np.median(rho[order], axis=1), self._rho_max)
+        w = geometry.uvw(wi, wr)[order, 2]
+        uvw = np.stack(np.broadcast_arrays(middle[:, None] * np.cos(angles), middle[:, None] * np.sin(angles), w), -1)
+        factor = brdf.direction_factor(Material(), trapezoid(self._light, 1.0), wi[order], wr[order])
+        found = spectrum.gather(self._stack, half, self._lambda_min, self._r_max, self._nodes)
+        rules = quadrature.choose(self.integrand, middle, self._stack.sigma_um, self._budget.quadrature)
+        terms = device.integrate(
+            found,
+            spectrum.radii(self._stack.sigma_um, self._r_max),
+            spectrum.s_max(self._lambda_min),
+            middle,
+            rules,
+            self._w_terms + 8,
+        ).reshape(_PROBE_RHOS, 3, -1, len(angles))
+        x = polar.w_position(middle[:, None], w)
+        cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
+        return uvw, factor, np.einsum("rcka,rak->rac", terms, cosines)
+
+    @property
+    def exposure_ru(self) -> float:
+        return self._budget.exposure_ru
+
+
+class _Probes:
+    """Directions between any table's texels, with the exact values there."""
+
+    def __init__(self, search: _Search) -> None:
+        uvw, factor, exact = search.probe()
+        self._uvw, self._factor = uvw.reshape(-1, 3), factor.reshape(-1, 1)
+        self._exact, self._exposure = exact.reshape(-1, 3), search.exposure_ru
+
+    def error(self, table: polar.PolarTable) -> float:
+        """Mean CIELAB error of a table."""
+        found = np.nan_to_num(polar.look_up(table, self._uvw))
+        return float(np.mean(delta_e(self._factor * found, self._factor * self._exact, self._exposure)))
+
+
+def anisotropy(built: stack.Stack) -> tuple[float, float]:
+    """How azimuths should crowd, (stretch, axis in radians), from where the surface scatters light.
+
+    The second harmonic, over azimuth, of the cube root (as the eye sees) of its first-order spectrum.
+    """
+    zero = built.column_zero
+    power = np.sum(built.coefficients[:, zero:, :, 1] ** 2, axis=2)
+    fy = (np.arange(power.shape[0]) - built.row_zero)[:, None] * built.spacing_per_um[1]
+    fx = np.arange(power.shape[1]) * built.spacing_per_um[0]
+    r = np.hypot(fx, fy)
+    # the specular lobe is round and says nothing
+    seen = np.where(r > 6.0 / (2.0 * np.pi * built.sigma_um), np.cbrt(power) / np.maximum(r, fx[1]), 0.0)
+    harmonic = np.sum(seen * np.exp(2j * np.arctan2(fy, fx))) / max(float(seen.sum()), np.finfo(float).tiny)
+    stretch = max(_LEAST_STRETCH, (1.0 - abs(harmonic)) / (1.0 + abs(harmonic)))
+    return float(stretch), float(0.5 * np.angle(harmonic))
+
+
+def _whole_tiles(azimuths: int) -> int:
+    return TILE * ceil(azimuths / TILE)
