@@ -14,15 +14,25 @@ from pipeline.config import Config
 
 @click.command("run")
 @click.argument("config_paths", metavar="CONFIG...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.option(
+    "--until",
+    type=click.Choice(["surface", "table", "render"]),
+    help="Stop after this stage, with nothing laid out [default: all, and the bundle].",
+)
 @console.out_option
 @console.store_option
 @console.json_option
-def run_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool) -> None:
+def run_command(
+    config_paths: tuple[Path, ...], until: str | None, out: Path, store_root: Path | None, as_json: bool
+) -> None:
     """Do all that CONFIGs ask: surface, stack, table, maps, validation, bundle.
 
     Results land in OUT/NAME: BRDF maps (EXR, PNG), report.html and the bundle. Stages whose inputs have not
     changed are taken from the store. All configs are checked before the first one is baked.
     """
+    if until is not None:
+        _bake_until(load_all(config_paths), until, store_root, as_json)
+        return
     _bake_all(config_paths, out, store_root, as_json, with_bundle=True)
 
 
@@ -54,13 +64,42 @@ def _bake_all(
     _refuse_missed_budgets([result["stages"]["validate"]["summary"]["budget"] | result for result in results])
 
 
+def _bake_until(loaded: list[Config], until: str, store_root: Path | None, as_json: bool) -> None:
+    """Only the stages up to one: what they are is told, nothing is laid out."""
+    from pipeline import run
+
+    results: list[dict[str, Any]] = []
+    for config in loaded:
+        store = console.open_store(store_root)
+        console.note(f"{config.name}:")
+        with console.showing_progress() as progress:
+            steps = run.plan(config, store, until)
+            made = run.execute(config, steps, store, progress, console.teller(config, store))
+        stages = {name: {"key": a.key, "summary": a.summary} for name, a in made.items()}
+        results.append({"name": config.name, "stages": stages})
+    if as_json:
+        console.print_json(results)
+        return
+    for result in results:
+        for certificate in (stage["summary"].get("certificate") for stage in result["stages"].values()):
+            if certificate is not None:
+                click.echo(f"{result['name']}: {_certified(certificate)}")
+
+
+def _certified(certificate: dict[str, Any]) -> str:
+    return (
+        f"mean CIELAB error {certificate['measured']:.3f} at {certificate['exposure_ru']:g} RU on "
+        f"{certificate['random']['directions']} random directions, {certificate['delta_e']:g} allowed"
+    )
+
+
 def _refuse_missed_budgets(results: list[dict[str, Any]]) -> None:
     """Everything was baked and written, but a budget that was asked for and not met is a failure."""
     from pipeline.errors import AccuracyError
 
     lines = [
         f"{r['name']}: accuracy.delta_e asks for {r['delta_e']:g} at {r['exposure_ru']:g} RU, measured "
-        f"{r['measured']:.3g}. Raise table.resolution, lower table.step_nm or raise the budget."
+        f"{r['measured']:.3g}. Raise the budget, use the polar layout, or a finer table."
         for r in results
         if r["met"] is False
     ]
@@ -190,6 +229,6 @@ def _plan(config: Config, store: Any, folder: Path) -> list[dict[str, str]]:
         "key": "" if standing is None else standing.name,
         "state": "to do" if standing is None else "cached",
         "reason": f"none of this content stands in {folder}" if standing is None else run.UNCHANGED,
-        "cost": f"{config.table.resolution}² texels a table",
+        "cost": "tables, maps and report",
     }
     return [*rows, bundle]

@@ -197,7 +197,7 @@ def download(buffer: Any, out: np.ndarray) -> np.ndarray:
 
 
 def shared(array: np.ndarray) -> Any:
-    """A device buffer in the array's own memory where the device shares it; call `settle` before reading the array."""
+    """A device buffer in the array's own memory where the device shares it; `settle` it before reading the array."""
     cl = _opencl()
     return cl.Buffer(default_device().context, cl.mem_flags.READ_WRITE | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
 

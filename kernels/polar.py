@@ -1,4 +1,4 @@
-"""Host side of the polar kernels: power spectrum, spectral operator, spline table. Layouts as stated in opencl/*.cl."""
+"""Host side of the polar kernels: power spectrum, spectral operator, splines. Layouts as stated in opencl/*.cl."""
 
 from dataclasses import dataclass
 
@@ -67,7 +67,7 @@ def integrate(
     quadratures: RingQuadratures,
     w_terms: int,
 ) -> np.ndarray:
-    """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from E as `polar_spectrum` gives it.
+    """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from `polar_spectrum`'s E.
 
     `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,); w_terms is a multiple of 4.
     """

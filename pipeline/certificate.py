@@ -46,7 +46,7 @@ def certify(evaluate: Evaluator, field: HeightField, config: Config, progress: P
     if measured > budget:
         raise AccuracyError(
             f"the table misses its budget: on {random.directions} random directions its mean CIELAB error at "
-            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. Raise accuracy.delta_e, or leave "
+            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. Raise it, or leave "
             'table.rings, azimuths, terms and w_terms on "auto".'
         )
     return Certificate(budget, exposure, measured, random, checked)

@@ -326,7 +326,7 @@ DEFAULT_DELTA_E = 0.1
 
 
 class Accuracy(Section):
-    """The error budget: mean CIELAB error at one exposure. A polar table is planned for it, and for 0.1 without one."""
+    """The error budget: mean CIELAB error at one exposure. Polar tables are planned for it, and for 0.1 without."""
 
     delta_e: Annotated[float, Field(ge=1e-3, le=100)] | None = None
     exposure_ru: Positive = 7500.0

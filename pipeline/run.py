@@ -9,13 +9,12 @@ from pipeline import provenance
 from pipeline.config import Config, PolarLayout
 from pipeline.device_stack import require_device
 from pipeline.progress import Progress, silent
-from pipeline.stages import table
+from pipeline.stages import table, validate
 from pipeline.stages.render import RENDER
+from pipeline.stages.spectrum import SPECTRUM
 from pipeline.stages.stack import STACK
 from pipeline.stages.stage import Stage
 from pipeline.stages.surface import SURFACE
-from pipeline.stages.spectrum import SPECTRUM
-from pipeline.stages.validate import VALIDATE
 from pipeline.store import Artifact, Store
 
 UNCHANGED = "nothing it reads has changed"
@@ -25,7 +24,7 @@ _ON_DEVICE = {"spectrum", "table", "render", "validate"}
 def stages(config: Config) -> tuple[Stage, ...]:
     """Every stage of a config, in order: a table of either layout is made of its own spectrum of the surface."""
     before = SPECTRUM if isinstance(config.table, PolarLayout) else STACK
-    return (SURFACE, before, table.stage_of(config), RENDER, VALIDATE)
+    return (SURFACE, before, table.stage_of(config), RENDER, validate.stage_of(config))
 
 
 @dataclass(frozen=True)

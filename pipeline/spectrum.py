@@ -5,7 +5,7 @@ It knows no illuminant, observer or material: |P|^2(u, v, w; lambda) = E(rho / l
 Lagrange interpolation; azimuths are those of the tables made from it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -21,8 +21,8 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar_grid import Azimuths
 
-# radii lie one sigma_f apart, where interpolation on 8 nodes and integration over wavelengths leave 1e-4 of E; near the
-# origin four times closer, for there the specular lobe's flank is seen at full contrast
+# radii lie one sigma_f apart, where interpolation on 8 nodes and integration over wavelengths leave 1e-4 of E; near
+# the origin four times closer, for there the specular lobe's flank is seen at full contrast
 _SPACING, _SPACING_AT_ZERO = 1.0, 0.25
 _COARSENS_OVER = 30.0  # sigma_f
 _SPARE_RADII = 5
@@ -47,6 +47,14 @@ class PolarSpectrum:
     def s_per_um(self) -> Array:
         """The nodes in s = 2 pi |w| / lambda, 1/um."""
         return s_nodes(self.values.shape[2], self.s_max_per_um)
+
+    def thinned(self, every: int) -> "PolarSpectrum":
+        """The same on every `every`-th azimuth; what is left must fill whole tiles of both half turns."""
+        tiles, radii, nodes, lanes = self.values.shape
+        flat = np.moveaxis(self.values, 3, 1).reshape(tiles * lanes, radii, nodes)[::every]
+        values = np.moveaxis(flat.reshape(-1, lanes, radii, nodes), 1, 3)
+        azimuths = replace(self.azimuths, count=self.azimuths.count // every)
+        return replace(self, values=np.ascontiguousarray(values), azimuths=azimuths)
 
 
 def s_nodes(count: int, s_max_per_um: float) -> Array:

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from pipeline.convergence import Curve
 from pipeline.optics.colour_error import pixels
 from pipeline.surface.heightfield import HeightField
-from pipeline.validation import Curve, MapCheck
+from pipeline.validation import MapCheck
 
 _DPI = 110
 _MOST_PIXELS = 512

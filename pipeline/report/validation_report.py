@@ -1,5 +1,6 @@
 """The validation report: what was baked, how it looks, and how far it is from the truth."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +9,10 @@ from pipeline.report.page import Page
 from pipeline.store import Artifact
 
 Rows = list[list[str]]
+_STUDIED = {
+    "polar": "Azimuths are thinned; the step is one for all rings, beside the mean of those chosen ring by ring.",
+    "taylor": "Terms and step are varied at the views themselves, without a grid between.",
+}
 
 
 ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max")
@@ -58,7 +63,33 @@ def _cleaning_rows(done: dict[str, Any]) -> Rows:
     return rows
 
 
-def _settings_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
+def _settings_rows(before: dict[str, Any], table: dict[str, Any]) -> Rows:
+    """What the table is made of; `before` is the summary of its stack or power spectrum."""
+    return _polar_rows(before, table) if table["layout"] == "polar" else _taylor_rows(before, table)
+
+
+def _polar_rows(spectrum: dict[str, Any], table: dict[str, Any]) -> Rows:
+    rings, azimuths, certificate = table["rings"], table["azimuths"], table["certificate"]
+    return [
+        ["Chebyshev terms, nodes in s", f"{spectrum['terms']}, {spectrum['s_nodes']}"],
+        ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
+        ["rings even below ρ =", f"{rings['r0']:.3g}"],
+        [
+            "azimuths crowd by, about",
+            f"{1.0 / azimuths['stretch']:.2f}, {math.degrees(azimuths['axis_rad']):.0f}°",
+        ],
+        ["terms in |w|", str(table["w_terms"])],
+        ["wavelengths a ring", f"{table['wavelengths_mean']:.0f} on average, {table['wavelengths']} at most"],
+        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
+        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
+        [
+            f"certificate: mean ΔE at {certificate['exposure_ru']:g} RU",
+            f"{certificate['measured']:.3f} of {certificate['delta_e']:g} allowed",
+        ],
+    ]
+
+
+def _taylor_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
     n = table["resolution"]
     return [
         ["Taylor order N", str(stack["order"])],
@@ -75,7 +106,8 @@ def build(
     config: Config, inputs: Mapping[str, Artifact], results: dict[str, Any], pictures: Mapping[str, bytes]
 ) -> str:
     """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
-    surface, stack, table, render = (inputs[name].summary for name in ("surface", "stack", "table", "render"))
+    surface, table, render = (inputs[name].summary for name in ("surface", "table", "render"))
+    before = next(inputs[name].summary for name in ("stack", "spectrum") if name in inputs)
     page = Page(config.name, "Diffraction BRDF: what was baked and how far it is from the exact sum.")
     page.warnings(surface["warnings"])
     page.section("BRDF maps", f"All views of one light each, at {config.render.exposure_ru:g} RU.")
@@ -89,7 +121,7 @@ def build(
     page.table(["", ""], _surface_rows(surface))
     page.picture(pictures["surface"], "The height field as baked: levelled and centred, y up.")
     page.section("Table")
-    page.table(["", ""], _settings_rows(stack, table))
+    page.table(["", ""], _settings_rows(before, table))
     _add_errors(page, results)
     for name, png in pictures.items():
         if name.startswith("comparison"):
@@ -97,8 +129,8 @@ def build(
     page.section("How the error depends on the settings")
     page.picture(
         pictures["convergence"],
-        "Mean error as one setting varies and the others stay as configured (61 x 61 views, first light). Terms and "
-        "step are varied at the views themselves, without a grid between.",
+        "Mean error as one setting varies and the others stay as configured (61 x 61 views, first light). "
+        + _STUDIED[table["layout"]],
     )
     return page.render()
 

@@ -4,14 +4,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pipeline import validation
-from pipeline.config import Config
+from pipeline import convergence, validation
+from pipeline.config import Config, TaylorLayout
 from pipeline.device_stack import kernel_digest
-from pipeline.evaluate import table_evaluator
+from pipeline.evaluate import Evaluator, table_evaluator
 from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
 from pipeline.reference import Reference
-from pipeline.stages import render, stack, surface, table
+from pipeline.stages import render, spectrum, stack, surface, table
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
 
 REPORT = "report.html"
@@ -32,14 +32,14 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     from pipeline.report import plots, validation_report
 
     field = surface.load(inputs["surface"])
-    evaluate = table_evaluator(table.load(inputs["table"]), config)
+    evaluate = table_evaluator(table.load(config, inputs["table"]), config)
     reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
     lights, radius = config.render.lights, render.map_radius(config)
     directions = [render.light_direction(light) for light in lights]
     checks = [validation.check_map(evaluate, reference, config, wi, radius, progress) for wi in directions]
-    built = stack.load(inputs["stack"])
-    study = validation.Convergence(built, evaluate, reference, config, directions[0], radius)
-    curves = _curves(study, inputs["table"].summary["wavelengths"] > 1, progress)
+    coarse = convergence.CoarseMap(reference, config, directions[0], radius)
+    study = _study(config, inputs, evaluate, coarse)
+    curves = _curves(study.curves(inputs["table"].summary["wavelengths"] > 1), progress)
     maps = [
         {**light.model_dump(), "colour": [asdict(error) for error in check.colour]}
         for light, check in zip(lights, checks, strict=True)
@@ -62,13 +62,21 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     return results
 
 
-def _curves(study: validation.Convergence, has_steps: bool, progress: Progress) -> list[validation.Curve]:
-    """Every setting's curve; a laser line has no wavelength step to vary."""
-    settings = [study.terms, *([study.step] if has_steps else []), study.grid, study.exponent]
+def _study(
+    config: Config, inputs: Inputs, evaluate: Evaluator, coarse: convergence.CoarseMap
+) -> convergence.TaylorStudy | convergence.PolarStudy:
+    """What there is to vary in a config's layout."""
+    if isinstance(config.table, TaylorLayout):
+        return convergence.TaylorStudy(stack.load(inputs["stack"]), config.table, evaluate, coarse)
+    power = inputs["spectrum"]
+    return convergence.PolarStudy(spectrum.load(power), spectrum.planned(power), evaluate, coarse)
+
+
+def _curves(study: convergence.Study, progress: Progress) -> list[convergence.Curve]:
     curves = []
-    for i, setting in enumerate(settings):
+    for i, setting in enumerate(study):
         curves.append(setting())
-        progress("convergence", (i + 1) / len(settings))
+        progress("convergence", (i + 1) / len(study))
     return curves
 
 
@@ -80,4 +88,7 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
     return {"delta_e": asked, "exposure_ru": exposure, "measured": measured, "met": met}
 
 
-VALIDATE = Stage("validate", 1, ("surface", "stack", "table", "render"), _parameters, _produce)
+def stage_of(config: Config) -> Stage:
+    """Validation of either layout: it reads what the table was made of, too."""
+    before = "stack" if isinstance(config.table, TaylorLayout) else "spectrum"
+    return Stage("validate", 1, ("surface", before, "table", "render"), _parameters, _produce)

@@ -1,8 +1,8 @@
 """What a polar table is made of, chosen for an error budget: terms, nodes, rings, azimuths, quadrature.
 
 What a series needs follows from its tail: Bessel's functions bound Chebyshev's coefficients of every exponential
-(Jacobi-Anger). What the grid needs depends on the surface, so it is measured: three small tables beside probes that lie
-between their texels tell how the error falls with rings and with azimuths, and the product of both is made smallest.
+(Jacobi-Anger). What the grid needs depends on the surface, so it is measured: three small tables beside probes that
+lie between their texels tell how the error falls with rings and with azimuths, and their product is made smallest.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ _GRID_SHARE = 0.8  # of the budget, by rings and azimuths as the probes see it
 _MOST_BYTES = 3 * 2**30
 # a start for the search: the grid that keeps 0.1 on snake scans at sigma = 16.25 um
 _BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0265, 0.1
-_LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 96, 4096, 32768
+_LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
 _LEAST_STRETCH = 0.3
 _PROBE_RHOS, _PROBE_ANGLES = 48, 64
 _ROUNDS = 4
@@ -167,11 +167,11 @@ class _Search:
             need = 4 * azimuths * self._nodes * len(spectrum.radii(self._stack.sigma_um, self._r_max))
             if need > _MOST_BYTES:
                 raise AccuracyError(
-                    f"the power spectrum on {azimuths} azimuths and {self._nodes} nodes in s needs {need / 2**30:.1f} "
-                    f"GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller coherence.sigma_um, "
-                    "lower the heights or raise accuracy.delta_e."
+                    f"the power spectrum on {azimuths} azimuths and {self._nodes} nodes in s needs "
+                    f"{need / 2**30:.1f} GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller "
+                    "coherence.sigma_um, lower the heights or raise accuracy.delta_e."
                 )
-            self._cache = {azimuths: self._gather(Azimuths(azimuths, self._stretch, self._axis))}
+        self._cache = {azimuths: self._gather(Azimuths(azimuths, self._stretch, self._axis))}
         return self._cache[azimuths]
 
     def _gather(self, azimuths: Azimuths) -> spectrum.PolarSpectrum:
@@ -291,4 +291,5 @@ def anisotropy(built: stack.Stack) -> tuple[float, float]:
 
 
 def _whole_tiles(azimuths: int) -> int:
-    return TILE * ceil(azimuths / TILE)
+    """Tiles that are whole for every fourth azimuth too, so that coarser grids can be tried without another gather."""
+    return 4 * TILE * ceil(azimuths / (4 * TILE))

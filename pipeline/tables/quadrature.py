@@ -1,16 +1,16 @@
 """Wavelengths of the spectral integral, chosen ring by ring from an estimate of the error they leave.
 
-|P|^2 along a ray is a Fourier integral over the coherence window's autocorrelation, exp(-x^2 / (4 sigma^2)): at a ring rho
-a rule with weights q_l answers each e^(2 pi i x / lambda rho) with D(x rho) = sum_l q_l e^(2 pi i x rho / lambda_l). In speckle
-all x within the window carry independent amplitudes, so the relative error of the integral is the root mean square
-of D's error over the window. Large rings need fine steps, rings near the mirror direction few wavelengths.
+|P|^2 along a ray is a Fourier integral over the coherence window's autocorrelation, exp(-x^2 / (4 sigma^2)). At a
+ring rho a rule with weights q_l answers each of its waves with D(x rho) = sum_l q_l exp(2 pi i x rho / lambda_l). In
+speckle all x within the window carry independent amplitudes, so the relative error of the integral is the root
+mean square of D's error over the window. Large rings need fine steps, rings near the mirror direction few.
 """
 
 from collections.abc import Callable
 
 import numpy as np
 
-from kernels.polar import RingQuadratures
+from kernels.polar import RingQuadratures as RingQuadratures
 from pipeline.errors import AccuracyError
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
@@ -31,7 +31,7 @@ def choose(
     """
     coarse = integrand(_STEPS_NM[0])
     if len(coarse.lambda_nm) == 1:
-        return _assemble([coarse], np.zeros(len(rho), int))
+        return uniform(coarse, len(rho))
     x = np.linspace(0.0, _REACH_SIGMAS * sigma_um, _POINTS)
     share = np.exp(-0.5 * (x / sigma_um) ** 2)
     share /= share.sum()
@@ -51,6 +51,11 @@ def choose(
         f"the spectrum's lines need wavelengths closer than {_STEPS_NM[-2]} nm for an error of {tolerance:.1g}; "
         "raise accuracy.delta_e, or narrow spectrum.range_nm"
     )
+
+
+def uniform(rule: Quadrature, rings: int) -> RingQuadratures:
+    """The same rule for every ring."""
+    return _assemble([rule], np.zeros(rings, int))
 
 
 def _points(y_max: float, rule: Quadrature) -> int:
