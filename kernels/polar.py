@@ -65,13 +65,15 @@ def integrate(
     s_max_per_um: float,
     rho: np.ndarray,
     quadratures: RingQuadratures,
-    w_terms: int,
+    reflectance: np.ndarray,
 ) -> np.ndarray:
     """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from `polar_spectrum`'s E.
 
-    `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,); w_terms is a multiple of 4.
+    `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,). `reflectance` (nodes of all rings'
+    rules one after the other, w_terms) multiplies E at `w_nodes`; w_terms is a multiple of 4.
     """
     tiles, radii, nodes, _ = spectrum.shape
+    w_terms = reflectance.shape[1]
     outputs = 3 * w_terms
     groups = -(-outputs // _MOST_OUTPUTS)
     # outputs come in vectors of four
@@ -89,8 +91,8 @@ def integrate(
     )
     extent = _extents(radius_per_um, rho, quadratures, nodes)
     values_to_terms, _ = _chebyshev(nodes)
-    w_values_to_terms, w_nodes = _chebyshev(w_terms)
-    radius, rings, wavelengths, weights, spans, extents, cardinal, cosine, w_node = (
+    w_values_to_terms, _ = _chebyshev(w_terms)
+    radius, rings, wavelengths, weights, spans, extents, reflected, cardinal, cosine, w_node = (
         device.upload(a)
         for a in (
             radius_per_um,
@@ -99,9 +101,10 @@ def integrate(
             fourth_column(quadratures.weights).astype(np.float32),
             np.stack([quadratures.first, quadratures.count], axis=-1).astype(np.int32),
             extent,
+            reflectance.astype(np.float32),
             values_to_terms.astype(np.float32),
             w_values_to_terms.T.astype(np.float32),
-            (0.5 * (w_nodes + 1.0)).astype(np.float32),
+            w_nodes(w_terms).astype(np.float32),
         )
     )
     matrix = device.result_buffer(4 * groups * group * nodes * int(extent[:, 1].sum()))
@@ -115,6 +118,7 @@ def integrate(
         weights,
         spans,
         extents,
+        reflected,
         np.float32(s_max_per_um),
         cardinal,
         cosine,
@@ -128,7 +132,7 @@ def integrate(
 
 
 def _extents(radius_per_um: np.ndarray, rho: np.ndarray, quadratures: RingQuadratures, nodes: int) -> np.ndarray:
-    """int32 (rings, 4): the first radius that a ring's matrix reads, how many, and where the matrix begins."""
+    """int32 (rings, 4): the first radius of a ring's matrix, how many, where it begins, and its reflectances."""
     shortest = quadratures.lambda_um[quadratures.first]
     longest = quadratures.lambda_um[quadratures.first + quadratures.count - 1]
 
@@ -139,7 +143,13 @@ def _extents(radius_per_um: np.ndarray, rho: np.ndarray, quadratures: RingQuadra
     low, high = first_node(rho / longest), first_node(rho / shortest)
     count = high - low + _ORDER
     begin = np.concatenate([[0], np.cumsum(count * nodes)[:-1]])
-    return np.stack([low, count, begin, np.zeros_like(low)], axis=-1).astype(np.int32)
+    rows = np.concatenate([[0], np.cumsum(quadratures.count)[:-1]])
+    return np.stack([low, count, begin, rows], axis=-1).astype(np.int32)
+
+
+def w_nodes(w_terms: int) -> np.ndarray:
+    """Where E is taken over |w|, as shares of w_max: Chebyshev's nodes on [0, 1]."""
+    return 0.5 * (_chebyshev(w_terms)[1] + 1.0)
 
 
 def _chebyshev(count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -371,6 +371,8 @@ class Render(Section):
 class Publish(Section):
     version: Annotated[str, Field(pattern=r"^\d+\.\d+\.\d+$")] = "1.0.0"
     precision: Literal["float", "half"] = "float"
+    # RGBA textures of a polar table; "auto": all in float, as few as the error budget allows in half
+    textures: Literal["auto", "full"] | Annotated[int, Field(ge=1)] = "auto"
     licence: str | None = None
 
 

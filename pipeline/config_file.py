@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from pipeline.config import Config, Recipe
 from pipeline.errors import ConfigError
 
+_LAYOUTS = ("polar", "taylor")
 _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
 
 
@@ -90,7 +91,9 @@ def _fault(error: Any) -> tuple[str, str]:
     if error["type"] == "model_type":
         return key, f"expected a section (a table of keys), got {_shortened(error['input'])}"
     if error["type"].startswith("union_tag"):
-        return key, f"expected a kind, one of {', '.join(_KINDS)}, got {_shortened(error['input'])}"
+        called = str(error["ctx"]["discriminator"]).strip("'")
+        kinds = _KINDS if called == "kind" else _LAYOUTS
+        return key, f"expected a {called}, one of {', '.join(kinds)}, got {_shortened(error['input'])}"
     message = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "value_error":
         return key, message
@@ -103,6 +106,6 @@ def _shortened(value: Any) -> str:
 
 
 def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:
-    types = {"float", "str", "int", "LaserLine", *_KINDS}
+    types = {"float", "str", "int", "LaserLine", *_KINDS, *_LAYOUTS}
     shapes = ("tuple[", "literal[", "constrained-", "function-")
     return loc.index(part) > 0 and (part in types or part.startswith(shapes))

@@ -56,6 +56,10 @@ def _integrand(config: Config, step_nm: float) -> Quadrature:
     return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
+def _illumination(config: Config, step_nm: float) -> Quadrature:
+    return brdf.illumination(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
+
+
 class TaylorStudy:
     """Terms, wavelength step, resolution and exponent of the paper's table.
 
@@ -158,7 +162,7 @@ class PolarStudy:
         light, rho = self._config.spectrum, self._plan.rings.rho()
         steps = [1.0, 2.0, 5.0, 10.0, 20.0]
         errors = [
-            self._error(self._plan, rules=quadrature.uniform(_integrand(self._config, s), len(rho))) for s in steps
+            self._error(self._plan, rules=quadrature.uniform(_illumination(self._config, s), len(rho))) for s in steps
         ]
         low, high = light.range_nm
         chosen = (high - low) / (float(np.mean(self._rules(rho).count)) - 1.0)
@@ -166,7 +170,7 @@ class PolarStudy:
 
     def _rules(self, rho: Array) -> RingQuadratures:
         tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
-        return quadrature.choose(partial(_integrand, self._config), rho, self._spectrum.sigma_um, tolerance)
+        return quadrature.choose(partial(_illumination, self._config), rho, self._spectrum.sigma_um, tolerance)
 
     def _error(
         self,
@@ -175,5 +179,6 @@ class PolarStudy:
         rules: RingQuadratures | None = None,
     ) -> float:
         found = self._rules(planned.rings.rho()) if rules is None else rules
-        table = polar.build(spectrum or self._spectrum, planned.rings, found, planned.w_terms)
+        reflectance = partial(brdf.spectral_reflectance, self._config.material, self._config.spectrum)
+        table = polar.build(spectrum or self._spectrum, planned.rings, found, planned.w_terms, reflectance)
         return self._views.error(table_evaluator(table, self._config))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -21,10 +22,10 @@ _AT_ONCE = 16384
 
 def table_evaluator(table: PolarTable | TaylorTable, config: Config, progress: Progress = silent) -> Evaluator:
     """XYZ = C cos(ti) times what the table holds; NaN where the table's scene does not reach."""
-    quadrature = trapezoid(config.spectrum, config.mean_step_nm)
+    outside = _outside_factor(table, config)
 
     def evaluate(wi: Array, wr: Array) -> Array:
-        factor = brdf.direction_factor(config.material, quadrature, wi, wr)
+        factor = outside(wi, wr)
         uvw = geometry.uvw(wi, wr)
         out = np.empty((len(wr), 3))
         for first in range(0, len(wr), _AT_ONCE):
@@ -34,6 +35,13 @@ def table_evaluator(table: PolarTable | TaylorTable, config: Config, progress: P
         return out
 
     return evaluate
+
+
+def _outside_factor(table: PolarTable | TaylorTable, config: Config) -> Callable[[Array, Array], Array]:
+    """C cos(ti), as far as the table does not hold it: polar tables hold a metal's reflectance at every angle."""
+    if isinstance(table, PolarTable) and config.material.fresnel == "conductor":
+        return partial(brdf.geometry_factor, config.material)
+    return partial(brdf.direction_factor, config.material, trapezoid(config.spectrum, config.mean_step_nm))
 
 
 def _look_up(table: PolarTable | TaylorTable, uvw: Array) -> Array:

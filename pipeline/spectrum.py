@@ -21,9 +21,9 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar_grid import Azimuths
 
-# radii lie one sigma_f apart, where interpolation on 8 nodes and integration over wavelengths leave 1e-4 of E; near
-# the origin four times closer, for there the specular lobe's flank is seen at full contrast
-_SPACING, _SPACING_AT_ZERO = 1.0, 0.25
+# distances of radii in sigma_f. An integral over wavelengths averages what interpolation on 8 nodes leaves, 1e-4 of E
+# at one sigma_f; a laser line shows it. Near the origin the specular lobe's flank is seen at full contrast.
+SPACING, SPACING_OF_A_LINE, _SPACING_AT_ZERO = 1.0, 0.4, 0.25
 _COARSENS_OVER = 30.0  # sigma_f
 _SPARE_RADII = 5
 
@@ -62,27 +62,26 @@ def s_nodes(count: int, s_max_per_um: float) -> Array:
     return np.asarray(0.5 * s_max_per_um * (1.0 + np.cos(pi * (np.arange(count) + 0.5) / count)))
 
 
-def radii(sigma_um: float, r_max_per_um: float) -> Array:
-    """Radii from 0 to `r_max_per_um` and a few beyond, spaced by the width of the window's transform, 1/um."""
+def radii(sigma_um: float, r_max_per_um: float, spacing: float = SPACING) -> Array:
+    """Radii from 0 to `r_max_per_um` and a few beyond, 1/um; `spacing` in widths of the window's transform."""
     width = sigma_f(sigma_um)
     nodes = [0.0]
     while nodes[-1] < r_max_per_um:
         share = min(1.0, nodes[-1] / (_COARSENS_OVER * width))
-        nodes.append(nodes[-1] + width * (_SPACING_AT_ZERO + (_SPACING - _SPACING_AT_ZERO) * share))
-    return np.array(nodes + [nodes[-1] + width * _SPACING * i for i in range(1, _SPARE_RADII)])
+        nodes.append(nodes[-1] + width * (_SPACING_AT_ZERO + (spacing - _SPACING_AT_ZERO) * share))
+    return np.array(nodes + [nodes[-1] + width * spacing * i for i in range(1, _SPARE_RADII)])
 
 
 def chebyshev_stack(
     field: HeightField,
     sigma_um: float,
-    r_max_per_um: float,
+    reach_per_um: float,
     terms: int,
     tolerance: float,
     progress: Progress = silent,
 ) -> stack.Stack:
-    """The float32 stack that E up to `r_max_per_um` gathers from."""
-    reach = float(radii(sigma_um, r_max_per_um)[-1])
-    return stack.build(field, "chebyshev", terms, sigma_um, reach, tolerance, progress, np.float32)
+    """The float32 stack that E out to `reach_per_um` gathers from."""
+    return stack.build(field, "chebyshev", terms, sigma_um, reach_per_um, tolerance, progress, np.float32)
 
 
 def s_max(lambda_min_nm: float) -> float:
@@ -91,7 +90,7 @@ def s_max(lambda_min_nm: float) -> float:
 
 
 def gather(
-    built: stack.Stack, half_turn: Array, lambda_min_nm: float, r_max_per_um: float, nodes: int
+    built: stack.Stack, half_turn: Array, radius_per_um: Array, lambda_min_nm: float, nodes: int
 ) -> NDArray[np.float32]:
     """E (tiles, radii, nodes, 16) at azimuths of half a turn (radians, a multiple of 16), then at their opposites.
 
@@ -101,13 +100,12 @@ def gather(
     # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
     bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
-    return polar.polar_spectrum(upload(built), radii(built.sigma_um, r_max_per_um), half_turn, bessel)
+    return polar.polar_spectrum(upload(built), radius_per_um, half_turn, bessel)
 
 
 def build(
-    built: stack.Stack, azimuths: Azimuths, lambda_min_nm: float, r_max_per_um: float, nodes: int
+    built: stack.Stack, azimuths: Azimuths, radius_per_um: Array, lambda_min_nm: float, nodes: int
 ) -> PolarSpectrum:
-    """E of a Chebyshev stack on given azimuths; s reaches the shortest wavelength at |w| = 2."""
-    values = gather(built, azimuths.angles()[: azimuths.count // 2], lambda_min_nm, r_max_per_um, nodes)
-    radius = radii(built.sigma_um, r_max_per_um)
-    return PolarSpectrum(values, radius, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um)
+    """E of a Chebyshev stack on given azimuths and radii; s reaches the shortest wavelength at |w| = 2."""
+    values = gather(built, azimuths.angles()[: azimuths.count // 2], radius_per_um, lambda_min_nm, nodes)
+    return PolarSpectrum(values, radius_per_um, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config import Config, as_pair
+from pipeline.config import Config, PolarLayout, as_pair
 from pipeline.config_file import load, parse
 from pipeline.errors import ConfigError
 from pipeline.stages.render import map_name
@@ -45,8 +45,8 @@ def test_left_out_sections_take_their_documented_defaults(tmp_path):
     assert config.spectrum.range_nm == (380.0, 780.0)
     assert (config.material.fresnel, config.material.ior, config.material.metal) == ("schlick", 1.5, "Au")
     assert (config.material.shadowing, config.material.normalisation) == (True, "relative")
-    assert (config.table.layout, config.table.terms) == ("taylor", "auto")
-    assert (config.table.resolution, config.table.power, config.table.step_nm) == (501, 5.0, 5.0)
+    assert config.table == PolarLayout(terms="auto", rings="auto", azimuths="auto", w_terms="auto")
+    assert config.budget_delta_e == 0.1
     assert config.accuracy.exposure_ru == 7500.0
     assert config.scene is None
     assert (config.render.size, config.render.exposure_ru) == (512, 1500.0)
@@ -164,6 +164,7 @@ def test_every_fault_is_reported_at_once(tmp_path):
             metal = "Ag"
             ior = 0.5
             [table]
+            layout = "taylor"
             resolution = 500
             [render]
             lights = [{ theta_deg = 0 }, { theta_deg = 90, fi = 1 }]
@@ -213,9 +214,13 @@ def test_every_fault_is_reported_at_once(tmp_path):
         (with_section("spectrum", illuminant="nowhere.CSV"), "spectrum.illuminant", "no such file"),
         (with_section("material", metal="nowhere.csv"), "material.metal", "no such file"),
         (with_section("spectrum", range_nm=[300, 700]), "spectrum.range_nm", "360..830"),
-        (with_section("table", layout="polar"), "table.layout", "'taylor'"),
-        (with_section("table", resolution=500), "table.resolution", "odd"),
-        (with_section("table", terms=0), "table.terms", "greater than or equal to 1"),
+        (with_section("table", layout="square"), "table", "a layout, one of polar, taylor"),
+        (with_section("table", resolution=501), "table.resolution", "unknown key"),
+        (with_section("table", azimuths=100), "table.azimuths", "multiple of 32"),
+        (with_section("table", w_terms=6), "table.w_terms", "multiple of 4"),
+        (with_section("table", layout="taylor", rings=100), "table.rings", "unknown key"),
+        (with_section("table", layout="taylor", resolution=500), "table.resolution", "odd"),
+        (with_section("table", terms=0), "table.terms", "greater than or equal to 2"),
         (with_section("render", lights=[]), "render.lights", "at least 1"),
         (with_section("scene"), "scene.lights", "required"),
         ({**MINIMAL, "name": "../a"}, "name", "pattern"),
@@ -235,7 +240,8 @@ def test_fault_names_its_key_and_what_is_wrong(document, key, said):
 def test_only_positive_finite_numbers_are_lengths_exposures_and_steps(section, value):
     """ "5" is no number, true is none, and neither NaN nor infinity is a size."""
     name, key = section
-    assert list(faults(with_section(name, **{key: value}))) == [f"{name}.{key}"]
+    layout = {"layout": "taylor"} if name == "table" else {}
+    assert list(faults(with_section(name, **layout, **{key: value}))) == [f"{name}.{key}"]
 
 
 @pytest.mark.parametrize("key", ["theta_deg", "phi_deg"])

@@ -40,7 +40,9 @@ static void lagrange(__global const double *radius, const int first, const doubl
  *   rho       double[rings]
  *   lambda    double[], weights float4[]    um; X, Y, Z: the nodes of every ring's quadrature
  *   nodes     int2[rings]            where a ring's quadrature begins, and its length
- *   extent    int4[rings]            first radius (may be negative), radii, where its matrix begins in units of OUT
+ *   extent    int4[rings]            first radius (may be negative), radii, where its matrix begins in units of OUT,
+ *                                    where its rows of `reflectance` begin
+ *   reflectance  float[...][W_TERMS] of the material at each wavelength of a ring and each node of w; 1 outside metals
  *   cardinal  float[S_NODES][S_NODES]    C_j = sum_k cardinal[k][j] T_k
  *   cosine    float4[W_TERMS][W_TERMS / 4]   Chebyshev coefficients from values at the nodes, [w node][term]
  *   w_node    float4[W_TERMS / 4]    nodes of w in [0, 1], shares of w_max
@@ -48,7 +50,7 @@ static void lagrange(__global const double *radius, const int first, const doubl
  */
 __kernel void build_operator(__global const double *radius, const int radii, __global const double *rho,
                              __global const double *lambda, __global const float4 *weights, __global const int2 *nodes,
-                             __global const int4 *extent, const float s_max, __global const float *cardinal,
+                             __global const int4 *extent, __global const float *reflectance, const float s_max, __global const float *cardinal,
                              __global const float4 *cosine, __global const float4 *w_node, __global float *matrix) {
     const int ring = get_global_id(0), steps = extent[ring].y * S_NODES;
     __global float *out = matrix + (long)extent[ring].z * GROUP * GROUPS;
@@ -57,6 +59,7 @@ __kernel void build_operator(__global const double *radius, const int radii, __g
 
     for (int l = nodes[ring].x; l < nodes[ring].x + nodes[ring].y; ++l) {
         const double r = rho[ring] / lambda[l];
+        __global const float *reflected = reflectance + (long)(extent[ring].w + l - nodes[ring].x) * W_TERMS;
         const int first = first_node(radius, radii, r);
         float along_r[ORDER];
         lagrange(radius, first, r, along_r);
@@ -75,7 +78,7 @@ __kernel void build_operator(__global const double *radius, const int radii, __g
             for (int b = 0; b < W_TERMS / 4; ++b) {
                 float4 sum = 0.0f;
                 for (int k = 0; k < S_NODES; ++k) sum = fma((float4)cardinal[k * S_NODES + j], T[k][b], sum);
-                vstore4(sum, b, value);
+                vstore4(sum * vload4(b, reflected), b, value);
             }
             float4 term[W_TERMS / 4];
             for (int b = 0; b < W_TERMS / 4; ++b) {

@@ -9,7 +9,7 @@ from math import pi
 
 import numpy as np
 
-from pipeline.config import Material, Spectrum
+from pipeline.config import FINE_STEP_NM, Material, Spectrum
 from pipeline.optics import fresnel, geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature, trapezoid
@@ -38,6 +38,25 @@ def geometry_factor(material: Material, wi: Array, wr: Array) -> Array:
     w = geometry.uvw(wi, wr)[..., 2]
     factor = geometry.obliquity(wi, wr) * wi[..., 2] / w**2
     return factor * geometry.v_cavity(wi, wr) if material.shadowing else factor
+
+
+def illumination(material: Material, spectrum: Spectrum, step_nm: float, sigma_um: float) -> Quadrature:
+    """Light, observer and the window's area, as one quadrature for R |P|^2."""
+    quadrature = trapezoid(spectrum, step_nm)
+    area = window_area(material, quadrature, sigma_um)
+    return Quadrature(quadrature.lambda_nm, quadrature.weights * area[:, None])
+
+
+def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Array, cos_half: Array) -> Array:
+    """What of R stays inside the spectral integral (..., L) at half angles (...,): a metal's; 1 of all else."""
+    if material.fresnel != "conductor":
+        return np.ones((*np.shape(cos_half), len(lambda_nm)))
+    values = fresnel.reflectance(np.asarray(cos_half)[..., None], fresnel.metal_index(material.metal, lambda_nm))
+    if material.normalisation == "absolute":
+        return values
+    light = trapezoid(spectrum, FINE_STEP_NM)
+    index = fresnel.metal_index(material.metal, light.lambda_nm)
+    return np.asarray(values / _luminous_mean(fresnel.reflectance(1.0, index), light))
 
 
 def integrand(material: Material, spectrum: Spectrum, step_nm: float, sigma_um: float) -> Quadrature:

@@ -38,7 +38,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     light = partial(_integrand, config)
     budget = spectrum.budget(config)
     rules = quadrature.choose(light, plan.rings.rho(), config.coherence.sigma_um, budget.quadrature)
-    table = polar.build(power, plan.rings, rules, plan.w_terms)
+    reflectance = partial(brdf.spectral_reflectance, config.material, config.spectrum)
+    table = polar.build(power, plan.rings, rules, plan.w_terms, reflectance)
     progress("table", 1.0)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
     certified = certificate.certify(table_evaluator(table, config), surface.load(inputs["surface"]), config, progress)
@@ -70,7 +71,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 
 def _integrand(config: Config, step_nm: float) -> Any:
-    return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
+    return brdf.illumination(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
 def load(artifact: Artifact) -> polar.PolarTable:

@@ -27,7 +27,7 @@ from pipeline.tables.polar_grid import RHO_MAX, TILE, Azimuths, Rings
 # shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
 _AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
 _NODES_SHARE = 0.02  # of E, by its nodes in s
-_W_SHARE = 0.3  # of the table, by its terms in |w|
+_W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|; of at most 0.1
 _QUADRATURE_SHARE = 3e-3  # of each integral, by its wavelengths
 _GRID_SHARE = 0.8  # of the budget, by rings and azimuths as the probes see it
 _MOST_BYTES = 3 * 2**30
@@ -99,8 +99,11 @@ def make(
     # whole vectors of terms cost the same and are shared with the device without a copy
     terms = device.LANES * ceil(wanted / device.LANES)
     nodes = series.chebyshev_order(z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
-    built = spectrum.chebyshev_stack(field, sigma_um, outer / (1e-3 * lambda_min), terms, amplitude, progress)
-    search = _Search(built, light, scene, budget, layout, nodes, z)
+    line = isinstance(light.illuminant, LaserLine)
+    spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
+    radius = spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
+    built = spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
+    search = _Search(built, radius, light, scene, budget, layout, nodes, z)
     return search.run()
 
 
@@ -110,6 +113,7 @@ class _Search:
     def __init__(
         self,
         built: stack.Stack,
+        radius: Array,
         light: Spectrum,
         scene: Scene | None,
         budget: Budget,
@@ -119,12 +123,13 @@ class _Search:
     ) -> None:
         self._stack, self._budget, self._layout, self._nodes = built, budget, layout, nodes
         self._lambda_min, self._rho_max = shortest_wavelength_nm(light), rho_max(scene)
-        self._r_max = self._rho_max / (1e-3 * self._lambda_min)
+        self._radius = radius
         self._line = isinstance(light.illuminant, LaserLine)
         # E serves every illuminant of a range: plan for equal energy
         self._light = light if self._line else Spectrum(illuminant="E", range_nm=light.range_nm)
-        # |w| up to 2 spans half the phase that heights up and down do; the luminous middle counts, not the blue end
-        w_order = series.chebyshev_order(0.7 * z, min(0.1, _W_SHARE * budget.delta_e)) + 1
+        # the luminous middle of white light counts, not its blue end
+        phase, share = (z, _W_SHARE_OF_A_LINE) if self._line else (0.7 * z, _W_SHARE)
+        w_order = series.chebyshev_order(phase, share * min(0.1, budget.delta_e)) + 1
         self._w_terms = 4 * ceil(w_order / 4) if layout.w_terms == "auto" else layout.w_terms
         self._scene = scene
         self._stretch, self._axis = anisotropy(built)
@@ -133,6 +138,8 @@ class _Search:
 
     def run(self) -> tuple[spectrum.PolarSpectrum, Plan]:
         rings, azimuths = self._start()
+        # what does not fit is refused before anything is measured
+        self._spectrum(azimuths)
         error = None
         if "auto" in (self._layout.rings, self._layout.azimuths):
             rings, azimuths, error = self._smallest(rings, azimuths)
@@ -144,7 +151,7 @@ class _Search:
         finer = sqrt(_BASE_DELTA_E / self._budget.delta_e)
         window = self._stack.sigma_um / _BASE_SIGMA_UM
         x = asinh(self._rho_max / self._r0)
-        step = 0.5 * x / (self._r_max * 2.0 * np.pi * self._stack.sigma_um) if self._line else _BASE_RING_STEP
+        step = 0.5 * x / (self._radius[-1] * 2.0 * np.pi * self._stack.sigma_um) if self._line else _BASE_RING_STEP
         rings = int(np.clip(x / step * finer, _LEAST_RINGS, _MOST_RINGS))
         azimuths = int(np.clip(_BASE_AZIMUTHS * window * finer, _LEAST_AZIMUTHS, _MOST_AZIMUTHS))
         layout = self._layout
@@ -164,7 +171,7 @@ class _Search:
 
     def _spectrum(self, azimuths: int) -> spectrum.PolarSpectrum:
         if azimuths not in self._cache:
-            need = 4 * azimuths * self._nodes * len(spectrum.radii(self._stack.sigma_um, self._r_max))
+            need = 4 * azimuths * self._nodes * len(self._radius)
             if need > _MOST_BYTES:
                 raise AccuracyError(
                     f"the power spectrum on {azimuths} azimuths and {self._nodes} nodes in s needs "
@@ -175,7 +182,7 @@ class _Search:
         return self._cache[azimuths]
 
     def _gather(self, azimuths: Azimuths) -> spectrum.PolarSpectrum:
-        return spectrum.build(self._stack, azimuths, self._lambda_min, self._r_max, self._nodes)
+        return spectrum.build(self._stack, azimuths, self._radius, self._lambda_min, self._nodes)
 
     def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
         """Rings and azimuths whose error is within the budget at the least product, as far as a model tells."""
@@ -188,10 +195,11 @@ class _Search:
             return errors[r, a]
 
         # e^2 = (rings' share) / rings^4 + (azimuths' share) / azimuths^4 + the rest, from three tables
-        fewer_rings, fewer_azimuths = max(8, 3 * rings // 4), _whole_tiles(3 * azimuths // 4)
         here = error(rings, azimuths) ** 2
-        by_rings = max(error(fewer_rings, azimuths) ** 2 - here, 0.0) / (fewer_rings**-4.0 - rings**-4.0)
-        by_azimuths = max(error(rings, fewer_azimuths) ** 2 - here, 0.0) / (fewer_azimuths**-4.0 - azimuths**-4.0)
+        other_rings = _other(rings, 3 * rings // 4)
+        other_azimuths = _other(azimuths, _whole_tiles(3 * azimuths // 4))
+        by_rings = _share(error(other_rings, azimuths) ** 2 - here, other_rings, rings)
+        by_azimuths = _share(error(rings, other_azimuths) ** 2 - here, other_azimuths, azimuths)
         rest = max(here - by_rings * rings**-4.0 - by_azimuths * azimuths**-4.0, 0.0)
         left = max(target**2 - rest, 0.25 * target**2)
         for _ in range(_ROUNDS):
@@ -240,15 +248,15 @@ class _Search:
         w = geometry.uvw(wi, wr)[order, 2]
         uvw = np.stack(np.broadcast_arrays(middle[:, None] * np.cos(angles), middle[:, None] * np.sin(angles), w), -1)
         factor = brdf.direction_factor(Material(), trapezoid(self._light, 1.0), wi[order], wr[order])
-        found = spectrum.gather(self._stack, half, self._lambda_min, self._r_max, self._nodes)
+        found = spectrum.gather(self._stack, half, self._radius, self._lambda_min, self._nodes)
         rules = quadrature.choose(self.integrand, middle, self._stack.sigma_um, self._budget.quadrature)
         terms = device.integrate(
             found,
-            spectrum.radii(self._stack.sigma_um, self._r_max),
+            self._radius,
             spectrum.s_max(self._lambda_min),
             middle,
             rules,
-            self._w_terms + 8,
+            polar.at_nodes(polar.grey, middle, rules, self._w_terms + 8),
         ).reshape(_PROBE_RHOS, 3, -1, len(angles))
         x = polar.w_position(middle[:, None], w)
         cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
@@ -290,6 +298,16 @@ def anisotropy(built: stack.Stack) -> tuple[float, float]:
     return float(stretch), float(0.5 * np.angle(harmonic))
 
 
+def _other(count: int, coarser: int) -> int:
+    """A second count to measure at: the coarser one, or the double where that is none."""
+    return coarser if coarser < count else 2 * count
+
+
+def _share(growth: float, other: int, here: int) -> float:
+    """c of an error c / n^4 that grows by `growth` from `here` to `other`."""
+    return float(max(growth / (other**-4.0 - here**-4.0), 0.0))
+
+
 def _whole_tiles(azimuths: int) -> int:
-    """Tiles that are whole for every fourth azimuth too, so that coarser grids can be tried without another gather."""
+    """Tiles that are whole for every fourth azimuth too, so coarser grids need no other gather."""
     return 4 * TILE * ceil(azimuths / (4 * TILE))

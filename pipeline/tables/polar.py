@@ -6,6 +6,7 @@ where `table` is looked up by bicubic B-splines. On the disc of a ring w reaches
 (u, v, w) is the sum of two unit vectors.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,14 +38,42 @@ class PolarTable:
         return int(self.values.shape[2])
 
 
-def build(spectrum: PolarSpectrum, rings: Rings, quadratures: RingQuadratures, w_terms: int) -> PolarTable:
-    """The table of a power spectrum under one light, observer and material, as its quadratures hold them."""
+# R (..., L) inside the spectral integral from wavelengths in nm (L,) and cosines of half angles (...,)
+Reflectance = Callable[[Array, Array], Array]
+
+
+def grey(lambda_nm: Array, cos_half: Array) -> Array:
+    """Nothing of R varies with wavelength, so all of it stays outside the integral."""
+    return np.ones((*cos_half.shape, len(lambda_nm)))
+
+
+def build(
+    spectrum: PolarSpectrum,
+    rings: Rings,
+    quadratures: RingQuadratures,
+    w_terms: int,
+    reflectance: Reflectance = grey,
+) -> PolarTable:
+    """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
+    rho = rings.rho()
+    reflected = at_nodes(reflectance, rho, quadratures, w_terms)
     samples = polar.integrate(
-        spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um, rings.rho(), quadratures, w_terms
+        spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um, rho, quadratures, reflected
     )
     values = polar.spline_coefficients(samples)
     shape = (rings.count, 3, w_terms, spectrum.azimuths.count)
     return PolarTable(values.reshape(shape), PolarGrid(rings, spectrum.azimuths))
+
+
+def at_nodes(reflectance: Reflectance, rho: Array, quadratures: RingQuadratures, w_terms: int) -> Array:
+    """R (nodes of all rings' rules, w terms). (u, v, w) = -wi - wr, so cos(half angle) = sqrt(rho^2 + w^2) / 2."""
+    shares = polar.w_nodes(w_terms)
+    found = []
+    for ring, first, count in zip(rho, quadratures.first, quadratures.count, strict=True):
+        w = shares * np.sqrt(max(4.0 - ring**2, 0.0))
+        lambda_nm = 1e3 * quadratures.lambda_um[first : first + count]
+        found.append(reflectance(lambda_nm, 0.5 * np.hypot(ring, w)).T)
+    return np.concatenate(found)
 
 
 def w_position(rho: Array, w: Array) -> Array:

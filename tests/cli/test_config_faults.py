@@ -19,6 +19,7 @@ range_nm = [780, 380]
 illuminant = "D66"
 
 [table]
+layout = "taylor"
 resolution = 500
 step_nm = 0
 

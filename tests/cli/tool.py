@@ -23,7 +23,7 @@ SMALL: dict[str, Any] = {
     "surface": {"recipe": {"kind": "sinusoid", "amplitude_um": 0.02, "size_um": 10, "pitch_um": 0.1}},
     "coherence": {"sigma_um": 2.0},
     "spectrum": {"range_nm": [540, 560]},
-    "table": {"resolution": 41},
+    "table": {"layout": "taylor", "resolution": 41},
     "accuracy": {"delta_e": 50.0},
     "render": {"size": 32},
 }

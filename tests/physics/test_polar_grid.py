@@ -1,0 +1,105 @@
+"""Where the texels of a polar table lie, and what splines between them keep."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import spline_filter1d
+
+from kernels import polar as device
+from pipeline.tables.polar import PolarTable, look_up
+from pipeline.tables.polar_grid import Azimuths, PolarGrid, Rings
+
+GRIDS = [Azimuths(64), Azimuths(96, 0.4, 0.3), Azimuths(32, 0.7, -1.5)]
+
+
+@pytest.mark.parametrize("azimuths", GRIDS)
+def test_an_azimuth_is_its_own_index(azimuths: Azimuths) -> None:
+    angles = azimuths.angles()
+    uv = 0.7 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    apart = (azimuths.index(uv) - np.arange(azimuths.count) + 0.5 * azimuths.count) % azimuths.count
+    np.testing.assert_allclose(apart, 0.5 * azimuths.count, atol=1e-9)
+
+
+@pytest.mark.parametrize("azimuths", GRIDS)
+def test_half_a_turn_is_half_the_azimuths_whatever_the_stretch(azimuths: Azimuths) -> None:
+    angles, half = azimuths.angles(), azimuths.count // 2
+    turned = (angles[half:] - angles[:half]) % (2.0 * np.pi)
+    np.testing.assert_allclose(turned, np.pi, atol=1e-12)
+
+
+def test_stretched_azimuths_crowd_about_their_axis() -> None:
+    angles = Azimuths(128, 0.25, np.radians(30.0)).angles()
+    gap = np.abs(np.angle(np.exp(1j * (np.roll(angles, -1) - angles))))
+    at_axis, across = (np.argmin(np.abs(np.angle(np.exp(1j * (angles - np.radians(d)))))) for d in (30.0, 120.0))
+    assert gap[across] / gap[at_axis] == pytest.approx(16.0, rel=0.1)
+
+
+def test_rings_run_from_zero_to_the_rim_and_are_their_own_index() -> None:
+    rings = Rings(50, 0.1, 1.7)
+    rho = rings.rho()
+    assert (rho[0], rho[-1]) == (0.0, 1.7)
+    np.testing.assert_allclose(rings.index(rho), np.arange(50), atol=1e-9)
+    # even at first, by ratios at last
+    assert (rho[2] - rho[1]) / rho[1] == pytest.approx(1.0, rel=0.02)
+    assert (rho[-1] / rho[-2]) == pytest.approx(rho[-2] / rho[-3], rel=1e-3)
+
+
+def test_spline_coefficients_are_those_of_an_independent_filter() -> None:
+    rng = np.random.default_rng(1)
+    samples = rng.random((40, 4, 64), np.float32)
+    found = device.spline_coefficients(samples.copy())
+    around = spline_filter1d(samples.astype(float), 3, axis=2, mode="grid-wrap")
+    # beyond the first ring lies the opposite half turn
+    both = np.concatenate([np.roll(around[:0:-1], 32, axis=2), around])
+    expected = spline_filter1d(both, 3, axis=0, mode="mirror")[39:]
+    np.testing.assert_allclose(found, expected, atol=2e-6)
+
+
+def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
+    """A table that holds function(u, v) in X, twice it in Y and it times |w| / w_max in Z."""
+    rho, phi = rings.rho()[:, None], azimuths.angles()
+    values = function(rho * np.cos(phi), rho * np.sin(phi))
+    samples = np.zeros((rings.count, 12, azimuths.count), np.float32)
+    samples[:, 0], samples[:, 4] = values, 2.0 * values
+    # |w| / w_max = (T_0 + T_1) / 2
+    samples[:, 8] = samples[:, 9] = 0.5 * values
+    coefficients = device.spline_coefficients(samples)
+    return PolarTable(coefficients.reshape(rings.count, 3, 4, azimuths.count), PolarGrid(rings, azimuths))
+
+
+def directions(rho: np.ndarray, phi: np.ndarray, share: float) -> np.ndarray:
+    return np.stack([rho * np.cos(phi), rho * np.sin(phi), -share * np.sqrt(4.0 - rho**2)], axis=-1)
+
+
+@pytest.mark.parametrize("azimuths", [Azimuths(256), Azimuths(256, 0.6, 0.5)])
+def test_a_smooth_function_comes_back_everywhere_and_at_the_origin(azimuths: Azimuths) -> None:
+    """u is odd through the origin: a table that forgot the opposite half turn would break there."""
+
+    def function(u, v):
+        return np.exp(-(u**2) - 0.5 * (v - 0.2) ** 2) * (2.0 + u)
+
+    table = table_of(function, azimuths, Rings(200, 0.1))
+    rng = np.random.default_rng(2)
+    # at the rim the spline ends with a flat slope: the last rings keep a digit less
+    for rho, tolerance in ((1e-9, 2e-5), (3e-3, 2e-5), (0.02, 2e-5), (0.3, 2e-5), (1.6, 2e-5), (1.9, 3e-4)):
+        phi = rng.uniform(-np.pi, np.pi, 400)
+        uvw = directions(np.full(400, rho), phi, 0.7)
+        expected = function(uvw[:, 0], uvw[:, 1])
+        found = look_up(table, uvw)
+        np.testing.assert_allclose(found[:, 0], expected, atol=tolerance)
+        np.testing.assert_allclose(found[:, 1], 2.0 * expected, atol=2.0 * tolerance)
+        np.testing.assert_allclose(found[:, 2], 0.7 * expected, atol=tolerance)
+
+
+def test_beyond_the_last_ring_nothing_is_known_and_on_it_all() -> None:
+    table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1, 1.5))
+    inside, outside = look_up(table, directions(np.array([1.5, 1.51]), np.zeros(2), 0.5))
+    np.testing.assert_allclose(inside, [1.0, 2.0, 0.5], rtol=1e-5)
+    assert np.all(np.isnan(outside))
+
+
+def test_the_rim_and_vanishing_w_are_ordinary() -> None:
+    table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1))
+    uvw = np.array([[2.0, 0.0, 0.0], [0.0, -2.0, -1e-12], [1.2, 0.0, -1e-300], [0.0, 0.0, -2.0]])
+    found = look_up(table, uvw)
+    assert np.all(np.isfinite(found))
+    np.testing.assert_allclose(found[:, 0], 1.0, rtol=1e-5)

@@ -1,0 +1,151 @@
+"""E(r, phi, s) against sums over samples, and the spectral operator against the reference's integral."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from kernels import polar as device
+from pipeline import series, spectrum
+from pipeline.config import LaserLine, Material, Spectrum
+from pipeline.errors import AccuracyError
+from pipeline.optics import brdf
+from pipeline.optics.spectra import trapezoid
+from pipeline.reference import Reference, power_direct
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables import polar, quadrature
+from pipeline.tables.polar_grid import Azimuths, Rings
+
+SIGMA = 2.0
+LIGHT = Spectrum()
+
+
+def rough(ny: int = 120, nx: int = 90, height: float = 0.1, pitch: tuple[float, float] = (0.1, 0.09)) -> HeightField:
+    """White noise: every frequency, no symmetry."""
+    return HeightField(np.random.default_rng(3).uniform(-height, height, (ny, nx)), pitch)
+
+
+def spectrum_of(field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0) -> spectrum.PolarSpectrum:
+    z = series.largest_phase(field.half_range_um, lambda_min_nm)
+    terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
+    radius = spectrum.radii(SIGMA, 2e3 / lambda_min_nm)
+    built = spectrum.chebyshev_stack(field, SIGMA, radius[-1], 16 * -(-terms // 16), 1e-6)
+    return spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
+
+
+def ones(rule, rings: int, w_terms: int) -> np.ndarray:
+    return np.ones((rings * len(rule.lambda_nm), w_terms))
+
+
+@pytest.mark.parametrize("height", [0.0, 0.1, 0.6])
+def test_every_node_is_the_sum_over_samples(height: float) -> None:
+    """Both half turns, one vector of terms and several, and zero where the scan knows nothing."""
+    field, azimuths = rough(height=height), Azimuths(64, 0.6, 0.3)
+    power = spectrum_of(field, azimuths)
+    rng = np.random.default_rng(0)
+    tile, ring, node, lane = (rng.integers(n, size=150) for n in power.values.shape)
+    r, phi = power.radius_per_um[ring], azimuths.angles()[16 * tile + lane]
+    # at 1 um, (u, v) is the frequency and |w| = s / (2 pi)
+    uvw = np.stack([r * np.cos(phi), r * np.sin(phi), -power.s_per_um[node] / (2.0 * np.pi)], axis=-1)
+    expected = power_direct(field, SIGMA, uvw, 1000.0)
+    found = power.values[tile, ring, node, lane]
+    unknown = np.isnan(expected)
+    assert np.all(found[unknown] == 0.0)
+    level = np.mean(expected[~unknown])
+    np.testing.assert_allclose(found[~unknown], expected[~unknown], rtol=1e-4, atol=2e-4 * level)
+
+
+def test_what_the_scan_does_not_know_is_zero() -> None:
+    field = rough(pitch=(0.2, 0.2))
+    power = spectrum_of(field, Azimuths(32))
+    r, phi = power.radius_per_um, power.azimuths.angles()[0]
+    assert phi == 0.0
+    np.testing.assert_array_equal(power.values[0, :, :, 0].max(axis=1) == 0.0, r > 2.5)
+
+
+def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
+    field = rough()
+    fine, coarse = (spectrum_of(field, Azimuths(n, 0.7, 0.1)) for n in (128, 64))
+    thinned = fine.thinned(2)
+    assert thinned.azimuths == coarse.azimuths
+    np.testing.assert_allclose(thinned.values, coarse.values, rtol=1e-4, atol=1e-7)
+
+
+@pytest.mark.parametrize("w_terms", [8, 12])
+def test_a_ring_holds_the_integral_over_wavelengths(w_terms: int) -> None:
+    """Rings at the origin, where radii are mirrored, and out to the rim; 12 terms in |w| take two groups of sums."""
+    field = rough()
+    power = spectrum_of(field, Azimuths(32, 0.8, 0.2))
+    rho = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.9, 2.0])
+    rule = trapezoid(LIGHT, 5.0)
+    terms = device.integrate(
+        power.values,
+        power.radius_per_um,
+        power.s_max_per_um,
+        rho,
+        quadrature.uniform(rule, len(rho)),
+        ones(rule, len(rho), w_terms),
+    ).reshape(len(rho), 3, w_terms, 32)
+    reference = Reference(field, SIGMA, 380.0)
+    for share in (0.05, 0.5, 0.97):
+        cosines = np.cos(np.arange(w_terms) * np.arccos(2.0 * share - 1.0))
+        found = np.einsum("rcka,k->rac", terms, cosines)
+        phi = power.azimuths.angles()
+        w = -share * np.sqrt(4.0 - rho**2)
+        uvw = np.stack(
+            np.broadcast_arrays(rho[:, None] * np.cos(phi), rho[:, None] * np.sin(phi), w[:, None]), axis=-1
+        )
+        exact = np.nan_to_num(reference.power(uvw.reshape(-1, 3), rule.lambda_nm)) @ rule.weights
+        exact = exact.reshape(found.shape)
+        # at the rim |w| vanishes and with it all light but the mirror's
+        level = exact.mean(axis=(1, 2), keepdims=True) + 1e-7
+        assert np.max(np.abs(found - exact) / (exact + level)) < 6e-3
+
+
+def test_wavelengths_follow_the_radius() -> None:
+    """Near the mirror direction a few, at the rim many; and the estimate bounds what is measured."""
+    rho, tolerance = Rings(40, 0.1).rho(), 1e-3
+    light = partial(lambda step: brdf.integrand(Material(), LIGHT, step, 16.25))
+    rules = quadrature.choose(light, rho, 16.25, tolerance)
+    assert np.all(np.diff(rules.count) >= 0)
+    assert rules.count[0] <= 41
+    assert rules.count[-1] >= 201
+    # independent waves in the window, as speckle has them
+    rng = np.random.default_rng(5)
+    x, exact = rng.normal(0.0, 16.25 / np.sqrt(2.0), 4000), light(0.05)
+    for ring in (5, 20, 39):
+        chosen = slice(rules.first[ring], rules.first[ring] + rules.count[ring])
+
+        def answer(lambda_um: np.ndarray, weights: np.ndarray, rho_of_ring: float = rho[ring]) -> np.ndarray:
+            return np.exp(2j * np.pi * np.outer(x, rho_of_ring / lambda_um)) @ weights[:, 1]
+
+        error = answer(rules.lambda_um[chosen], rules.weights[chosen]) - answer(1e-3 * exact.lambda_nm, exact.weights)
+        assert np.sqrt(np.mean(np.abs(error) ** 2)) < 2.0 * tolerance
+
+
+def test_a_laser_line_needs_one_wavelength() -> None:
+    light = Spectrum(illuminant=LaserLine(lambda_nm=532.0))
+    rules = quadrature.choose(
+        lambda step: brdf.integrand(Material(), light, step, 16.25), np.arange(3.0), 16.25, 1e-3
+    )
+    np.testing.assert_array_equal(rules.lambda_um, [0.532])
+    np.testing.assert_array_equal(rules.count, [1, 1, 1])
+
+
+def test_a_window_too_wide_for_the_finest_step_is_refused() -> None:
+    with pytest.raises(AccuracyError, match="closer than"):
+        quadrature.choose(lambda step: brdf.integrand(Material(), LIGHT, step, 300.0), np.array([2.0]), 300.0, 1e-4)
+
+
+def test_a_mirror_keeps_its_lobe() -> None:
+    """|P|^2 = exp(-(rho / lambda)^2 / sigma_f^2) at every w: the whole table in closed form."""
+    field = HeightField(np.full((100, 100), 3.0), (0.15, 0.15))
+    power = spectrum_of(field, Azimuths(32))
+    rings, rule = Rings(120, 0.1), trapezoid(LIGHT, 5.0)
+    table = polar.build(
+        power, rings, quadrature.uniform(rule, 120), 4, lambda nm, cos: np.ones((*cos.shape, len(nm)))
+    )
+    rho, phi = np.linspace(0.0, 0.3, 40), np.linspace(0.0, 6.0, 40)
+    uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
+    lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)
+    np.testing.assert_allclose(polar.look_up(table, uvw), lobe @ rule.weights, atol=3e-5)
