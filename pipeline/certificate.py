@@ -10,9 +10,8 @@ from pipeline.config import Config
 from pipeline.errors import AccuracyError
 from pipeline.evaluate import Evaluator
 from pipeline.optics.colour_error import ColourError
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress, silent
-from pipeline.reference import Reference
+from pipeline.reference import reference_of
 from pipeline.surface.heightfield import HeightField
 from pipeline.validation import RandomCheck, RelativeError, check_random, check_reference
 
@@ -37,8 +36,8 @@ def certify(evaluate: Evaluator, field: HeightField, config: Config, progress: P
 
     Raises AccuracyError where it misses its budget, or where the reference's two routes part.
     """
-    reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum))
-    checked = check_reference(field, reference, config)
+    reference = reference_of(field, config)
+    checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(evaluate, reference, config, progress)
     exposure = config.accuracy.exposure_ru
     measured = _at(random.colour, exposure)

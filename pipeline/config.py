@@ -206,10 +206,14 @@ class Surface(Section):
 
 
 class Coherence(Section):
-    """The Gaussian window exp(-r^2 / (2 sigma^2)) of coherent light; 65 um = 4 sigma in [D14] 4.2."""
+    """The Gaussian window exp(-r^2 / (2 sigma^2)) of coherent light; 65 um = 4 sigma in [D14] 4.2.
+
+    windows: "auto" averages |P|^2 over the windows that a larger scan holds (polar tables), "centre" takes one.
+    """
 
     sigma_um: Annotated[float, Field(ge=1e-3, le=1e4)] = 16.25
     boundary: Literal["periodic"] = "periodic"
+    windows: Literal["auto", "centre"] = "auto"
 
 
 class LaserLine(Section):

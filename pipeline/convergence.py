@@ -13,7 +13,7 @@ from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature, trapezoid
-from pipeline.reference import STEP_NM, Reference
+from pipeline.reference import STEP_NM, MeanReference
 from pipeline.spectrum import PolarSpectrum
 from pipeline.tables import plan, polar, quadrature, taylor
 from pipeline.tables.polar_grid import TILE
@@ -40,7 +40,7 @@ Study = Sequence[Callable[[], Curve]]
 class CoarseMap:
     """A coarse map under one light, with the truth there."""
 
-    def __init__(self, reference: Reference, config: Config, light: Array, radius: float) -> None:
+    def __init__(self, reference: MeanReference, config: Config, light: Array, radius: float) -> None:
         self.config, self._unit = config, relative_unit(config)
         self.wr = Map(_MAP_SIZE, min(MAP_RADIUS, radius)).views()
         self.wi = np.broadcast_to(light, self.wr.shape)

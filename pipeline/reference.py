@@ -8,14 +8,14 @@ Two routes to the same number:
   direction and wavelength on the device, in float64.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import pi
 
 import numpy as np
 
 from kernels import diffraction
-from pipeline import series, stack
-from pipeline.config import FINE_STEP_NM, Config, Material, Spectrum
+from pipeline import series, stack, windows
+from pipeline.config import FINE_STEP_NM, Config, Material, PolarLayout, Spectrum
 from pipeline.device_stack import upload
 from pipeline.evaluate import Evaluator
 from pipeline.optics import brdf, geometry
@@ -120,9 +120,37 @@ class Reference:
         return out
 
 
+class MeanReference:
+    """The mean of |P|^2 over several places of the window, each by a `Reference` of its own.
+
+    One is in memory at a time: each answer makes all of them again but the first.
+    """
+
+    def __init__(
+        self, fields: Sequence[HeightField], sigma_um: float, lambda_min_nm: float, progress: Progress = silent
+    ) -> None:
+        self.fields, self._sigma_um, self._lambda_min_nm, self._progress = fields, sigma_um, lambda_min_nm, progress
+        self.first = Reference(fields[0], sigma_um, lambda_min_nm, progress)
+
+    def xyz(self, spectrum: Spectrum, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
+        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        total = self.first.xyz(spectrum, material, wi, wr, progress=progress)
+        for field in self.fields[1:]:
+            other = Reference(field, self._sigma_um, self._lambda_min_nm, self._progress)
+            total += other.xyz(spectrum, material, wi, wr, progress=progress)
+        return total / len(self.fields)
+
+
+def reference_of(field: HeightField, config: Config, progress: Progress = silent) -> MeanReference:
+    """The reference of a config: the mean over windows where its table is one, else the middle window's."""
+    fields = windows.places(field, config.coherence) if isinstance(config.table, PolarLayout) else [field]
+    lambda_min = shortest_wavelength_nm(config.spectrum)
+    return MeanReference(fields, config.coherence.sigma_um, lambda_min, progress)
+
+
 def reference_evaluator(field: HeightField, config: Config, progress: Progress = silent) -> Evaluator:
     """XYZ of pairs of directions by the exact reference under a config's light and material."""
-    reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
+    reference = reference_of(field, config, progress)
 
     def evaluate(wi: Array, wr: Array) -> Array:
         return reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)

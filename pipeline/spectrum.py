@@ -26,6 +26,7 @@ from pipeline.tables.polar_grid import Azimuths
 SPACING, SPACING_OF_A_LINE, _SPACING_AT_ZERO = 1.0, 0.4, 0.25
 _COARSENS_OVER = 30.0  # sigma_f
 _SPARE_RADII = 5
+_CONTRAST_AZIMUTHS = 65
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,22 @@ class PolarSpectrum:
         values = np.moveaxis(flat.reshape(-1, lanes, radii, nodes), 1, 3)
         azimuths = replace(self.azimuths, count=self.azimuths.count // every)
         return replace(self, values=np.ascontiguousarray(values), azimuths=azimuths)
+
+
+def speckle_contrast(spectrum: PolarSpectrum) -> float:
+    """Variance of E over its squared local mean: 1 for the speckle of one window, 1 / n for the mean of n.
+
+    Taken over azimuths, at the radii beyond the specular lobe and the middle node in s; where E is dark or smooth it
+    counts as little.
+    """
+    tiles, radii, nodes, lanes = spectrum.values.shape
+    e = np.moveaxis(spectrum.values[:, radii // 4 : -_SPARE_RADII, nodes // 2], 2, 1).reshape(tiles * lanes, -1)
+    kernel = np.ones(min(_CONTRAST_AZIMUTHS, len(e)))
+    kernel /= len(kernel)
+    # around the turn: E is periodic
+    local = np.fft.irfft(np.fft.rfft(e, axis=0) * np.fft.rfft(kernel, len(e))[:, None], len(e), axis=0)
+    local = np.maximum(np.roll(local, -(len(kernel) // 2), axis=0), np.finfo(np.float32).tiny)
+    return float(np.median(np.mean((e / local - 1.0) ** 2, axis=0)))
 
 
 def s_nodes(count: int, s_max_per_um: float) -> Array:

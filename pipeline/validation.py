@@ -13,7 +13,7 @@ from pipeline.optics.colour_error import ColourError, colour_errors, delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature, trapezoid
 from pipeline.progress import Progress, silent
-from pipeline.reference import Reference, power_direct
+from pipeline.reference import MeanReference, Reference, power_direct
 from pipeline.surface.heightfield import HeightField
 
 # the map over which this project states colour errors: 301 x 301 inside radius 0.98
@@ -67,7 +67,7 @@ class RandomCheck:
 
 
 def check_random(
-    evaluate: Evaluator, reference: Reference, config: Config, progress: Progress = silent
+    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> RandomCheck:
     """The table (`evaluate`) against the reference on directions it was not made for."""
     wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
@@ -95,7 +95,7 @@ class MapCheck:
 
 def check_map(
     evaluate: Evaluator,
-    reference: Reference,
+    reference: MeanReference,
     config: Config,
     light: Array,
     radius: float,

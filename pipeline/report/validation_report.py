@@ -46,6 +46,7 @@ def _surface_rows(summary: dict[str, Any]) -> Rows:
         ],
         ["reachable frequencies known", f"{100 * s['reach_covered']:.1f} %"],
         ["rms step across the seams (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["seam_step_um"]))],
+        ["of the heights' energy, in the seams", f"{100 * s['seam_energy']:.2g} %"],
         ["rms step between samples (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["inner_step_um"]))],
         *_cleaning_rows(summary["conditioning"]),
     ]
@@ -72,6 +73,7 @@ def _polar_rows(spectrum: dict[str, Any], table: dict[str, Any]) -> Rows:
     rings, azimuths, certificate = table["rings"], table["azimuths"], table["certificate"]
     return [
         ["Chebyshev terms, nodes in s", f"{spectrum['terms']}, {spectrum['s_nodes']}"],
+        ["windows averaged, contrast left", f"{spectrum['windows']}, {spectrum['speckle_contrast']:.2f}"],
         ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
         ["rings even below ρ =", f"{rings['r0']:.3g}"],
         [

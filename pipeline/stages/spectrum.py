@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kernels import device
-from pipeline import arrays, digest, spectrum
+from pipeline import arrays, digest, spectrum, windows
 from pipeline.config import Config, LaserLine, PolarLayout
 from pipeline.device_stack import kernel_digest
 from pipeline.progress import Progress
@@ -29,7 +29,7 @@ def layout_of(config: Config) -> PolarLayout:
 def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernel": [kernel_digest("polar_spectrum.cl"), *planning_kernels()],
-        "sigma_um": config.coherence.sigma_um,
+        "coherence": config.coherence.model_dump(mode="json"),
         "wavelengths": _wavelengths(config),
         "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
         "table": layout_of(config).model_dump(mode="json"),
@@ -57,10 +57,10 @@ def budget(config: Config) -> plan.Budget:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    field = surface.load(inputs["surface"])
+    fields = windows.places(surface.load(inputs["surface"]), config.coherence)
     light = config.spectrum
     built, chosen = plan.make(
-        field, config.coherence.sigma_um, light, config.scene, budget(config), layout_of(config), progress
+        fields, config.coherence.sigma_um, light, config.scene, budget(config), layout_of(config), progress
     )
     arrays.save(
         folder / _FILE,
@@ -79,7 +79,13 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "band_per_um": list(built.band_per_um),
         },
     )
-    return {**asdict(chosen), "radii": len(built.radius_per_um), "bytes": built.values.nbytes}
+    return {
+        **asdict(chosen),
+        "radii": len(built.radius_per_um),
+        "bytes": built.values.nbytes,
+        "windows": len(fields),
+        "speckle_contrast": spectrum.speckle_contrast(built),
+    }
 
 
 def planned(artifact: Artifact) -> plan.Plan:

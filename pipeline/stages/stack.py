@@ -92,4 +92,4 @@ def load(artifact: Artifact) -> dft_stack.Stack:
     return dft_stack.Stack(coefficients=arrays.load(zarr, "F"), **found)
 
 
-STACK = Stage("stack", 1, ("surface",), _parameters, _produce)
+STACK = Stage("stack", 2, ("surface",), _parameters, _produce)

@@ -92,7 +92,8 @@ def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: flo
     if min(statistics.windows) < 3.99:
         found.append(
             f"the patch ({statistics.size_um[0]:.4g} x {statistics.size_um[1]:.4g} um) is smaller than the coherence "
-            f"window (4 sigma = {4 * sigma_um:g} um) and repeats under it: repeats are seen as orders of their own"
+            f"window (4 sigma = {4 * sigma_um:g} um) and repeats under it: repeats are seen as orders of their own, "
+            f"and the seams between them hold {100 * statistics.seam_energy:.2g} % of the heights' energy"
         )
     return found
 
@@ -104,4 +105,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 1, (), _parameters, _produce)
+SURFACE = Stage("surface", 2, (), _parameters, _produce)

@@ -8,9 +8,8 @@ from pipeline import convergence, validation
 from pipeline.config import Config, TaylorLayout
 from pipeline.device_stack import kernel_digest
 from pipeline.evaluate import Evaluator, table_evaluator
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
-from pipeline.reference import Reference
+from pipeline.reference import reference_of
 from pipeline.stages import render, spectrum, stack, surface, table
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
 
@@ -33,7 +32,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
     field = surface.load(inputs["surface"])
     evaluate = table_evaluator(table.load(config, inputs["table"]), config)
-    reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
+    reference = reference_of(field, config, progress)
     lights, radius = config.render.lights, render.map_radius(config)
     directions = [render.light_direction(light) for light in lights]
     checks = [validation.check_map(evaluate, reference, config, wi, radius, progress) for wi in directions]
@@ -45,7 +44,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         for light, check in zip(lights, checks, strict=True)
     ]
     results: Summary = {
-        "reference": asdict(validation.check_reference(field, reference, config)),
+        "reference": asdict(validation.check_reference(reference.fields[0], reference.first, config)),
         "random": asdict(validation.check_random(evaluate, reference, config, progress)),
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
@@ -91,4 +90,4 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
 def stage_of(config: Config) -> Stage:
     """Validation of either layout: it reads what the table was made of, too."""
     before = "stack" if isinstance(config.table, TaylorLayout) else "spectrum"
-    return Stage("validate", 1, ("surface", before, "table", "render"), _parameters, _produce)
+    return Stage("validate", 2, ("surface", before, "table", "render"), _parameters, _produce)

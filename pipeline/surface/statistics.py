@@ -40,6 +40,7 @@ class SurfaceStatistics:
     periods: the strongest periods, by share.
     seam_step_um: rms height step across the seam from the last column (row) to the first;
     inner_step_um: rms step between neighbouring columns (rows) inside.
+    seam_energy: share of the heights' variance that only closes the patch's edges upon each other;
     windows: patch size over the coherence window's sigma.
     """
 
@@ -55,6 +56,7 @@ class SurfaceStatistics:
     periods: tuple[Period, ...]
     seam_step_um: tuple[float, float]
     inner_step_um: tuple[float, float]
+    seam_energy: float
     windows: tuple[float, float]
 
 
@@ -80,8 +82,27 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
         periods=dominant_periods(field, reach),
         seam_step_um=(_rms(heights[:, 0] - heights[:, -1]), _rms(heights[0] - heights[-1])),
         inner_step_um=(_rms(np.diff(heights, axis=1)), _rms(np.diff(heights, axis=0))),
+        seam_energy=_seam_energy(heights),
         windows=(size_x / sigma_um, size_y / sigma_um),
     )
+
+
+def _seam_energy(heights: Array) -> float:
+    """Share of the variance in the smooth part of Moisan's decomposition (2011): a periodic surface has none.
+
+    The part solves a Poisson equation whose sources are the steps across the patch's edges.
+    """
+    ny, nx = heights.shape
+    steps = np.zeros_like(heights)
+    steps[0] += heights[-1] - heights[0]
+    steps[-1] += heights[0] - heights[-1]
+    steps[:, 0] += heights[:, -1] - heights[:, 0]
+    steps[:, -1] += heights[:, 0] - heights[:, -1]
+    waves = 2.0 * np.cos(2.0 * np.pi * np.fft.fftfreq(ny))[:, None] + 2.0 * np.cos(2.0 * np.pi * np.fft.rfftfreq(nx))
+    waves[0, 0] = np.inf  # the mean, relative to 4
+    smooth = np.fft.irfft2(np.fft.rfft2(steps) / (waves - 4.0), heights.shape)
+    variance = float(np.var(heights))
+    return float(np.var(smooth)) / variance if variance > 0.0 else 0.0
 
 
 def _rms(values: Array) -> float:

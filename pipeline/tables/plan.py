@@ -5,6 +5,7 @@ What a series needs follows from its tail: Bessel's functions bound Chebyshev's 
 lie between their texels tell how the error falls with rings and with azimuths, and their product is made smallest.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asinh, ceil, sqrt
 
@@ -79,7 +80,7 @@ def rho_max(scene: Scene | None) -> float:
 
 
 def make(
-    field: HeightField,
+    fields: Sequence[HeightField],
     sigma_um: float,
     light: Spectrum,
     scene: Scene | None,
@@ -87,13 +88,14 @@ def make(
     layout: PolarLayout,
     progress: Progress = silent,
 ) -> tuple[spectrum.PolarSpectrum, Plan]:
-    """The power spectrum of a height field on the azimuths that the budget asks for, and the whole plan.
+    """The power spectrum on the azimuths that the budget asks for, and the whole plan.
 
-    Of the light only its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of
-    reach or E would not fit into memory.
+    `fields` are the places of the window (pipeline.windows); E is their mean, planned on the first. Of the light only
+    its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of reach or E would not fit
+    into memory.
     """
     lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
-    z = series.largest_phase(field.half_range_um, lambda_min)
+    z = series.largest_phase(max(field.half_range_um for field in fields), lambda_min)
     amplitude = _AMPLITUDE_SHARE * budget.delta_e
     wanted = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
     # whole vectors of terms cost the same and are shared with the device without a copy
@@ -102,9 +104,13 @@ def make(
     line = isinstance(light.illuminant, LaserLine)
     spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
     radius = spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
-    built = spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
-    search = _Search(built, radius, light, scene, budget, layout, nodes, z)
-    return search.run()
+    built = spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
+    made, plan = _Search(built, radius, light, scene, budget, layout, nodes, z).run()
+    for field in fields[1:]:
+        built = spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
+        made.values[...] += spectrum.build(built, made.azimuths, radius, lambda_min, nodes).values
+    made.values[...] /= np.float32(len(fields))
+    return made, plan
 
 
 class _Search:

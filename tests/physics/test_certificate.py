@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import certificate, spectrum
+from pipeline import certificate, spectrum, windows
 from pipeline.config import Config
 from pipeline.config_file import parse
 from pipeline.errors import AccuracyError
@@ -32,7 +32,9 @@ def field_of(found: Config) -> HeightField:
 def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
     budget = plan.Budget(found.budget_delta_e, found.accuracy.exposure_ru)
     sigma = found.coherence.sigma_um
-    power, chosen = plan.make(field_of(found), sigma, found.spectrum, found.scene, budget, found.table)
+    power, chosen = plan.make(
+        windows.places(field_of(found), found.coherence), sigma, found.spectrum, found.scene, budget, found.table
+    )
 
     def light(step_nm: float):
         return brdf.illumination(found.material, found.spectrum, step_nm, sigma)
