@@ -8,6 +8,8 @@ import click
 
 from cli import console, sources
 
+# as configs have them
+_SHORTEST_NM, _LONGEST_NM = 360.0, 830.0
 _COLUMNS = ("theta_i", "phi_i", "theta_r", "phi_r")
 
 
@@ -20,24 +22,48 @@ _COLUMNS = ("theta_i", "phi_i", "theta_r", "phi_r")
     help="CSV with rows of theta_i,phi_i,theta_r,phi_r in degrees; '-' reads stdin.",
 )
 @click.option("--exact", is_flag=True, help="By the exact reference instead of the table (configs only).")
+@click.option(
+    "--wavelengths",
+    help='nm, as 450,550,650: print |P|^2 of each instead of X,Y,Z (configs whose table.form is "spectral").',
+)
 @console.store_option
 @console.json_option
-def eval_command(source: Path, directions: Path, exact: bool, store_root: Path | None, as_json: bool) -> None:
+def eval_command(
+    source: Path, directions: Path, exact: bool, wavelengths: str | None, store_root: Path | None, as_json: bool
+) -> None:
     """Print X,Y,Z under 1 RU for rows of directions, from SOURCE: a bundle's folder or a config.
 
     Directions point away from the surface; theta is measured from its normal, phi from +x.
     """
-    rows = _read_directions(directions)
-    wi, wr = _unit_vectors(rows)
+    import numpy as np
+
+    asked = None if wavelengths is None else _read_wavelengths(wavelengths)
+    wi, wr = _unit_vectors(_read_directions(directions))
     with console.showing_progress() as progress:
-        xyz = sources.evaluator(source, exact, store_root, progress)(wi, wr)
-    sources.refuse_unreached(xyz, str(directions), str(source))
+        if asked is None:
+            columns = ["X", "Y", "Z"]
+            values = sources.evaluator(source, exact, store_root, progress)(wi, wr)
+        else:
+            columns = [f"I_{nm:g}" for nm in asked]
+            values = sources.spectral_evaluator(source, exact, store_root, progress)(wi, wr, np.array(asked))
+    sources.refuse_unreached(values, str(directions), str(source))
     if as_json:
-        console.print_json([dict(zip("XYZ", map(float, row), strict=True)) for row in xyz])
+        console.print_json([dict(zip(columns, map(float, row), strict=True)) for row in values])
         return
-    click.echo("X,Y,Z")
-    for row in xyz:
+    click.echo(",".join(columns))
+    for row in values:
         click.echo(",".join(f"{value:.12g}" for value in row))
+
+
+def _read_wavelengths(text: str) -> list[float]:
+    try:
+        found = [float(cell) for cell in text.split(",")]
+    except ValueError:
+        found = [0.0]
+    if not all(_SHORTEST_NM <= nm <= _LONGEST_NM for nm in found):
+        limits = f"{_SHORTEST_NM:g}..{_LONGEST_NM:g}"
+        raise click.UsageError(f"--wavelengths: expected nm within {limits}, as 450,550, got {text!r}")
+    return found
 
 
 def _read_directions(path: Path) -> list[list[float]]:

@@ -47,6 +47,30 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
     return table_evaluator(table.load(config, artifact), config, progress)
 
 
+def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
+    """|P|^2 of pairs of directions at wavelengths in nm, from a config's power spectrum or its exact reference."""
+    if source.is_dir():
+        raise click.UsageError("--wavelengths needs a config: a bundle's tables are integrated over wavelengths")
+    config = load(source)
+    if not exact and getattr(config.table, "form", None) != "spectral":
+        raise click.UsageError('--wavelengths needs table.form = "spectral" in the config, or --exact')
+    from pipeline import run
+    from pipeline.optics.geometry import uvw
+    from pipeline.reference import reference_of
+    from pipeline.stages import spectrum, surface
+    from pipeline.tables import spectral
+
+    store = console.open_store(store_root)
+    until = "surface" if exact else "spectrum"
+    artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
+    artifact = store.open(until, artifacts[until].key)
+    if exact:
+        reference = reference_of(surface.load(artifact), config, progress)
+        return lambda wi, wr, lambda_nm: reference.power(uvw(wi, wr), lambda_nm)
+    table = spectral.build(spectrum.load(artifact))
+    return lambda wi, wr, lambda_nm: spectral.look_up(table, uvw(wi, wr), lambda_nm)
+
+
 def refuse_unreached(xyz: Any, what: str, source: str) -> None:
     """Tables made for a scene do not know the rest: NaN becomes a message."""
     import numpy as np

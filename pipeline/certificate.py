@@ -6,14 +6,30 @@ direction and every nanometre. It is checked itself, in every bake, against sums
 
 from dataclasses import dataclass
 
-from pipeline.config import Config
+import numpy as np
+
+from pipeline.config import Config, PolarLayout
+from pipeline.directions import random_pairs
 from pipeline.errors import AccuracyError
 from pipeline.evaluate import Evaluator
+from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError
+from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.reference import reference_of
+from pipeline.spectrum import PolarSpectrum
 from pipeline.surface.heightfield import HeightField
-from pipeline.validation import RandomCheck, RelativeError, check_random, check_reference
+from pipeline.tables import spectral
+from pipeline.validation import (
+    MIRROR_FLOOR,
+    RandomCheck,
+    RelativeError,
+    check_random,
+    check_reference,
+    relative_error,
+)
+
+_SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
 
 @dataclass(frozen=True)
@@ -49,6 +65,17 @@ def certify(evaluate: Evaluator, field: HeightField, config: Config, progress: P
             'table.rings, azimuths, terms and w_terms on "auto".'
         )
     return Certificate(budget, exposure, measured, random, checked)
+
+
+def certify_spectral(power: PolarSpectrum, config: Config, field: HeightField) -> RelativeError | None:
+    """Errors of I_lambda on random directions, where a config asks for the spectral form: else nothing to say."""
+    if not isinstance(config.table, PolarLayout) or config.table.form != "spectral":
+        return None
+    wi, wr = random_pairs(config.scene, _SPECTRAL_DIRECTIONS, _SEED)
+    uvw = geometry.uvw(wi, wr)
+    wavelengths = trapezoid(config.spectrum, _SPECTRAL_STEP_NM).lambda_nm
+    exact = np.nan_to_num(reference_of(field, config).power(uvw, wavelengths))
+    return relative_error(spectral.look_up(spectral.build(power), uvw, wavelengths), exact, MIRROR_FLOOR)
 
 
 def _at(errors: list[ColourError], exposure_ru: float) -> float:

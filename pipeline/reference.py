@@ -8,7 +8,7 @@ Two routes to the same number:
   direction and wavelength on the device, in float64.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import pi
 
 import numpy as np
@@ -134,10 +134,16 @@ class MeanReference:
 
     def xyz(self, spectrum: Spectrum, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        total = self.first.xyz(spectrum, material, wi, wr, progress=progress)
+        return self._mean(lambda each: each.xyz(spectrum, material, wi, wr, progress=progress))
+
+    def power(self, uvw: Array, lambda_nm: Array) -> Array:
+        """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
+        return self._mean(lambda each: each.power(uvw, lambda_nm))
+
+    def _mean(self, answer: Callable[[Reference], Array]) -> Array:
+        total = answer(self.first)
         for field in self.fields[1:]:
-            other = Reference(field, self._sigma_um, self._lambda_min_nm, self._progress)
-            total += other.xyz(spectrum, material, wi, wr, progress=progress)
+            total = total + answer(Reference(field, self._sigma_um, self._lambda_min_nm, self._progress))
         return total / len(self.fields)
 
 

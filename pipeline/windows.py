@@ -1,8 +1,8 @@
 """Where the coherence window stands on a scan that is larger than it: Stam's expectation of |P|^2, Welch's way.
 
-Coherent light sees one window at a time, and which one is chance. A scan that holds several shows what all of them look
-like: |P|^2 averaged over shifted windows is an estimate of its expectation ([S99], [D14] eq. 2) whose speckle has less
-contrast than one window's. A scan about as large as the window has one place for it: the middle.
+Coherent light sees one window at a time, and which one is chance. A scan that holds several shows what all of them
+look like: |P|^2 averaged over shifted windows is an estimate of its expectation ([S99], [D14] eq. 2), and its speckle
+has less contrast than one window's. A scan about as large as the window has one place for it: the middle.
 """
 
 from math import floor

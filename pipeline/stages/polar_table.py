@@ -43,6 +43,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     progress("table", 1.0)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
     certified = certificate.certify(table_evaluator(table, config), surface.load(inputs["surface"]), config, progress)
+    spectral = certificate.certify_spectral(power, config, surface.load(inputs["surface"]))
     arrays.save(
         folder / _FILE,
         {
@@ -67,6 +68,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "unknown_share": unknown,
         "skipped_share": 1.0 - (table.grid.rings.rho_max / 2.0) ** 2,
         "certificate": asdict(certified),
+        "spectral_error": None if spectral is None else asdict(spectral),
     }
 
 

@@ -91,8 +91,8 @@ def make(
     """The power spectrum on the azimuths that the budget asks for, and the whole plan.
 
     `fields` are the places of the window (pipeline.windows); E is their mean, planned on the first. Of the light only
-    its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of reach or E would not fit
-    into memory.
+    its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of reach or E would not
+    fit into memory.
     """
     lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
     z = series.largest_phase(max(field.half_range_um for field in fields), lambda_min)
@@ -101,8 +101,8 @@ def make(
     # whole vectors of terms cost the same and are shared with the device without a copy
     terms = device.LANES * ceil(wanted / device.LANES)
     nodes = series.chebyshev_order(z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
-    line = isinstance(light.illuminant, LaserLine)
-    spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
+    single = isinstance(light.illuminant, LaserLine) or layout.form == "spectral"
+    spacing = spectrum.SPACING_OF_A_LINE if single else spectrum.SPACING
     radius = spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
     built = spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
     made, plan = _Search(built, radius, light, scene, budget, layout, nodes, z).run()

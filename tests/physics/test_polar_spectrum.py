@@ -13,7 +13,7 @@ from pipeline.optics import brdf
 from pipeline.optics.spectra import trapezoid
 from pipeline.reference import Reference, power_direct
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import polar, quadrature
+from pipeline.tables import polar, quadrature, spectral
 from pipeline.tables.polar_grid import Azimuths, Rings
 
 SIGMA = 2.0
@@ -25,10 +25,12 @@ def rough(ny: int = 120, nx: int = 90, height: float = 0.1, pitch: tuple[float, 
     return HeightField(np.random.default_rng(3).uniform(-height, height, (ny, nx)), pitch)
 
 
-def spectrum_of(field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0) -> spectrum.PolarSpectrum:
+def spectrum_of(
+    field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0, spacing: float = spectrum.SPACING
+) -> spectrum.PolarSpectrum:
     z = series.largest_phase(field.half_range_um, lambda_min_nm)
     terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
-    radius = spectrum.radii(SIGMA, 2e3 / lambda_min_nm)
+    radius = spectrum.radii(SIGMA, 2e3 / lambda_min_nm, spacing)
     built = spectrum.chebyshev_stack(field, SIGMA, radius[-1], 16 * -(-terms // 16), 1e-6)
     return spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
 
@@ -149,3 +151,25 @@ def test_a_mirror_keeps_its_lobe() -> None:
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
     lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)
     np.testing.assert_allclose(polar.look_up(table, uvw), lobe @ rule.weights, atol=3e-5)
+
+
+def test_the_spectral_form_answers_every_wavelength_without_integration() -> None:
+    """Between all nodes, against sums over samples; the speckle's mean is what errors are held against."""
+    field = rough(height=0.08)
+    power = spectrum_of(field, Azimuths(1536), spacing=spectrum.SPACING_OF_A_LINE)
+    table = spectral.build(power)
+    rng = np.random.default_rng(6)
+    rho, phi, share = rng.uniform(0.05, 1.9, 60), rng.uniform(-np.pi, np.pi, 60), rng.uniform(0.1, 1.0, 60)
+    uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), -share * np.sqrt(4.0 - rho**2)], axis=-1)
+    wavelengths = np.array([380.0, 455.5, 633.0, 780.0])
+    exact = np.stack([np.nan_to_num(power_direct(field, SIGMA, uvw, nm)) for nm in wavelengths], axis=-1)
+    found = spectral.look_up(table, uvw, wavelengths)
+    error = np.abs(found - exact) / (exact + np.median(exact))
+    assert np.percentile(error, 90) < 2e-3
+    assert error.max() < 3e-2
+
+
+def test_the_spectral_form_says_where_it_ends() -> None:
+    table = spectral.build(spectrum_of(rough(), Azimuths(64), 500.0))
+    found = spectral.look_up(table, np.array([[1.9, 0.0, -0.1], [0.1, 0.0, -1.9]]), np.array([400.0, 500.0]))
+    np.testing.assert_array_equal(np.isnan(found), [[True, False], [True, False]])
