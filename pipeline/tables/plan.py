@@ -27,7 +27,7 @@ from pipeline.tables.polar_grid import RHO_MAX, TILE, Azimuths, Rings
 
 # shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
 _AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
-_NODES_SHARE = 0.02  # of E, by its nodes in s
+_NODES_SHARE = 0.005  # of E, by its nodes in s
 _W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|; of at most 0.1
 _QUADRATURE_SHARE = 3e-3  # of each integral, by its wavelengths
 _GRID_SHARE = 0.8  # of the budget, by rings and azimuths as the probes see it
@@ -40,6 +40,7 @@ _PROBE_RHOS, _PROBE_ANGLES = 48, 64
 _ROUNDS = 4
 _NEAR = 0.75  # of the target: near enough not to search on
 _SEED = 19991
+_LUMINOUS_NM = 545.0  # the middle of D65 under the eye's Y
 
 
 @dataclass(frozen=True)
@@ -101,11 +102,12 @@ def make(
     # whole vectors of terms cost the same and are shared with the device without a copy
     terms = device.LANES * ceil(wanted / device.LANES)
     nodes = series.chebyshev_order(z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
-    single = isinstance(light.illuminant, LaserLine) or layout.form == "spectral"
-    spacing = spectrum.SPACING_OF_A_LINE if single else spectrum.SPACING
+    light = _probing_light(light, layout)
+    line = isinstance(light.illuminant, LaserLine)
+    spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
     radius = spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
     built = spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
-    made, plan = _Search(built, radius, light, scene, budget, layout, nodes, z).run()
+    made, plan = _Search(built, radius, light, scene, budget, layout, lambda_min, nodes, z).run()
     for field in fields[1:]:
         built = spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
         made.values[...] += spectrum.build(built, made.azimuths, radius, lambda_min, nodes).values
@@ -124,17 +126,18 @@ class _Search:
         scene: Scene | None,
         budget: Budget,
         layout: PolarLayout,
+        lambda_min: float,
         nodes: int,
         z: float,
     ) -> None:
         self._stack, self._budget, self._layout, self._nodes = built, budget, layout, nodes
-        self._lambda_min, self._rho_max = shortest_wavelength_nm(light), rho_max(scene)
+        self._lambda_min, self._rho_max = lambda_min, rho_max(scene)
         self._radius = radius
         self._line = isinstance(light.illuminant, LaserLine)
-        # E serves every illuminant of a range: plan for equal energy
-        self._light = light if self._line else Spectrum(illuminant="E", range_nm=light.range_nm)
+        self._light = light
         # the luminous middle of white light counts, not its blue end
-        phase, share = (z, _W_SHARE_OF_A_LINE) if self._line else (0.7 * z, _W_SHARE)
+        phase = z * lambda_min / _middle_nm(light)
+        share = _W_SHARE_OF_A_LINE if self._line else _W_SHARE
         w_order = series.chebyshev_order(phase, share * min(0.1, budget.delta_e)) + 1
         self._w_terms = 4 * ceil(w_order / 4) if layout.w_terms == "auto" else layout.w_terms
         self._scene = scene
@@ -302,6 +305,22 @@ def anisotropy(built: stack.Stack) -> tuple[float, float]:
     harmonic = np.sum(seen * np.exp(2j * np.arctan2(fy, fx))) / max(float(seen.sum()), np.finfo(float).tiny)
     stretch = max(_LEAST_STRETCH, (1.0 - abs(harmonic)) / (1.0 + abs(harmonic)))
     return float(stretch), float(0.5 * np.angle(harmonic))
+
+
+def _probing_light(light: Spectrum, layout: PolarLayout) -> Spectrum:
+    """What the grid is planned under: E serves every illuminant of a range, so equal energy, or else one line."""
+    if isinstance(light.illuminant, LaserLine):
+        return light
+    if layout.form == "spectral":
+        return Spectrum(illuminant=LaserLine(lambda_nm=_middle_nm(light)))
+    return Spectrum(illuminant="E", range_nm=light.range_nm)
+
+
+def _middle_nm(light: Spectrum) -> float:
+    """The wavelength of a light that the eye weighs most."""
+    if isinstance(light.illuminant, LaserLine):
+        return light.illuminant.lambda_nm
+    return float(np.clip(_LUMINOUS_NM, *light.range_nm))
 
 
 def _other(count: int, coarser: int) -> int:
