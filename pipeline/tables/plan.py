@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import asinh, ceil, sqrt
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from kernels import polar as device
 from pipeline import series, spectrum, stack
@@ -17,6 +18,7 @@ from pipeline.config import LaserLine, Material, PolarLayout, Scene, Spectrum
 from pipeline.directions import random_pairs
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
+from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm, trapezoid
@@ -30,16 +32,17 @@ _AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
 _NODES_SHARE = 0.005  # of E, by its nodes in s
 _W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|; of at most 0.1
 _QUADRATURE_SHARE = 3e-3  # of each integral, by its wavelengths
-_GRID_SHARE = 0.8  # of the budget, by rings and azimuths as the probes see it
+_GRID_SHARE = 0.65  # of the budget, by rings and azimuths as the probes see it
 _MOST_BYTES = 3 * 2**30
 # a start for the search: the grid that keeps 0.1 on snake scans at sigma = 16.25 um
 _BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0265, 0.1
 _LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
 _LEAST_STRETCH = 0.3
-_PROBE_RHOS, _PROBE_ANGLES = 48, 64
+_PROBE_RHOS, _PROBE_ANGLES, _ANGLE_BINS = 48, 64, 1024
 _ROUNDS = 4
 _NEAR = 0.75  # of the target: near enough not to search on
 _SEED = 19991
+_MIDDLING_PER_UM = 1.0
 _LUMINOUS_NM = 545.0  # the middle of D65 under the eye's Y
 
 
@@ -241,14 +244,13 @@ class _Search:
         """The probing light under a wavelength step."""
         return brdf.integrand(Material(), self._light, step_nm, self._stack.sigma_um)
 
-    def probe(self) -> tuple[Array, Array, Array]:
-        """Probes' uvw and C cos ti (rhos, angles, ...), and the exact XYZ / (C cos ti) there.
+    def probe(self) -> tuple[Array, Array, Array, Array]:
+        """Probes' uvw and C cos ti (rhos, angles, ...), the exact XYZ / (C cos ti) there, and what each counts.
 
-        Exact means: from E at the probes' own rings and azimuths, with spare terms in |w|. Angles are stratified over
-        half a turn and serve its other half as well; each ring's pairs keep their own w.
+        Exact means: from E at the probes' own rings and azimuths, with spare terms in |w|. Angles of half a
+        turn serve its other half as well; each ring's pairs keep their own w.
         """
-        rng = np.random.default_rng(_SEED)
-        half = np.pi * (np.arange(_PROBE_ANGLES) + rng.random(_PROBE_ANGLES)) / _PROBE_ANGLES
+        half, counts = _probing_angles(self._stack, np.random.default_rng(_SEED))
         angles = np.concatenate([half, half + np.pi])
         wi, wr = random_pairs(self._scene, _PROBE_RHOS * len(angles), _SEED)
         rho = np.hypot(*(geometry.uvw(wi, wr)[:, :2].T))
@@ -269,7 +271,8 @@ class _Search:
         ).reshape(_PROBE_RHOS, 3, -1, len(angles))
         x = polar.w_position(middle[:, None], w)
         cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
-        return uvw, factor, np.einsum("rcka,rak->rac", terms, cosines)
+        each = np.broadcast_to(np.tile(counts, 2), factor.shape)
+        return uvw, factor, np.einsum("rcka,rak->rac", terms, cosines), each
 
     @property
     def exposure_ru(self) -> float:
@@ -280,31 +283,57 @@ class _Probes:
     """Directions between any table's texels, with the exact values there."""
 
     def __init__(self, search: _Search) -> None:
-        uvw, factor, exact = search.probe()
+        uvw, factor, exact, self._counts = search.probe()
         self._uvw, self._factor = uvw.reshape(-1, 3), factor.reshape(-1, 1)
         self._exact, self._exposure = exact.reshape(-1, 3), search.exposure_ru
 
     def error(self, table: polar.PolarTable) -> float:
         """Mean CIELAB error of a table."""
         found = np.nan_to_num(polar.look_up(table, self._uvw))
-        return float(np.mean(delta_e(self._factor * found, self._factor * self._exact, self._exposure)))
+        error = delta_e(self._factor * found, self._factor * self._exact, self._exposure)
+        return float(np.average(error, weights=self._counts.ravel()))
 
 
 def anisotropy(built: stack.Stack) -> tuple[float, float]:
     """How azimuths should crowd, (stretch, axis in radians), from where the surface scatters light.
 
-    The second harmonic, over azimuth, of the cube root (as the eye sees) of its first-order spectrum.
+    The second harmonic over azimuth of what is seen of it.
     """
-    zero = built.column_zero
-    power = np.sum(built.coefficients[:, zero:, :, 1] ** 2, axis=2)
+    phi, seen = _scattering(built)
+    harmonic = np.sum(seen * np.exp(2j * phi)) / max(float(seen.sum()), np.finfo(float).tiny)
+    stretch = max(_LEAST_STRETCH, (1.0 - abs(harmonic)) / (1.0 + abs(harmonic)))
+    return float(stretch), float(0.5 * np.angle(harmonic))
+
+
+def _scattering(built: stack.Stack) -> tuple[Array, Array]:
+    """Azimuths of the stack's frequencies, and how much of their light is seen: its cube root, as the eye does.
+
+    Of first order in the height, and per area of (u, v); without the specular lobe, which is round and says nothing.
+    """
+    power = np.sum(built.coefficients[:, built.column_zero :, :, 1] ** 2, axis=2)
     fy = (np.arange(power.shape[0]) - built.row_zero)[:, None] * built.spacing_per_um[1]
     fx = np.arange(power.shape[1]) * built.spacing_per_um[0]
     r = np.hypot(fx, fy)
-    # the specular lobe is round and says nothing
-    seen = np.where(r > 6.0 / (2.0 * np.pi * built.sigma_um), np.cbrt(power) / np.maximum(r, fx[1]), 0.0)
-    harmonic = np.sum(seen * np.exp(2j * np.arctan2(fy, fx))) / max(float(seen.sum()), np.finfo(float).tiny)
-    stretch = max(_LEAST_STRETCH, (1.0 - abs(harmonic)) / (1.0 + abs(harmonic)))
-    return float(stretch), float(0.5 * np.angle(harmonic))
+    seen = np.where(r > 6.0 * sigma_f(built.sigma_um), np.cbrt(power) / np.maximum(r, fx[1]), 0.0)
+    return np.arctan2(fy, fx), np.asarray(seen, float)
+
+
+def _probing_angles(built: stack.Stack, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Azimuths of half a turn to probe, and what each counts for in a mean over all.
+
+    Half of them go where light goes: a grating's orders lie on one line that even angles would miss.
+    """
+    phi, seen = _scattering(built)
+    lit, edges = np.histogram(phi % np.pi, bins=_ANGLE_BINS, range=(0.0, np.pi), weights=seen)
+    # the window gives a line flanks, as wide as its transform is at a middling radius
+    width = sigma_f(built.sigma_um) / _MIDDLING_PER_UM * _ANGLE_BINS / np.pi
+    lit = gaussian_filter1d(lit, width, mode="wrap")
+    share = 0.5 / _ANGLE_BINS + 0.5 * lit / max(float(lit.sum()), np.finfo(float).tiny)
+    share /= share.sum()
+    strata = (np.arange(_PROBE_ANGLES) + rng.random(_PROBE_ANGLES)) / _PROBE_ANGLES
+    found = np.interp(strata, np.concatenate([[0.0], np.cumsum(share)]), edges)
+    counts = 1.0 / share[np.minimum((found / np.pi * _ANGLE_BINS).astype(int), _ANGLE_BINS - 1)]
+    return found, counts / counts.mean()
 
 
 def _probing_light(light: Spectrum, layout: PolarLayout) -> Spectrum:
