@@ -20,50 +20,22 @@ AT_ONCE = 16384  # directions, to bound memory
 
 
 class Bundle:
-    """A bundle's tables in memory; i_p is (v, u, channel, p), computed is (v, u)."""
+    """A bundle in memory: XYZ = C cos(ti) times what its table holds at (u, v, w) = -wi - wr."""
 
     def __init__(self, folder: Path) -> None:
         self.manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        tables = sorted(self.manifest["tables"], key=lambda entry: int(entry["p"]))
-        planes = [read_rgba(folder / entry["file"]) for entry in tables]
-        self.i_p = np.stack([plane[..., :3] for plane in planes], axis=-1)
-        self.scale = [float(entry["scale"]) for entry in tables]
-        self.computed = planes[0][..., 3] == 1.0
-        self.n, self.power = int(self.manifest["grid"]["width"]), float(self.manifest["grid"]["power"])
+        images = sorted(self.manifest["tables"], key=lambda entry: int(entry["index"]))
+        planes = [read_rgba(folder / entry["file"]) for entry in images]
+        layout = {"taylor": TaylorTable, "polar": PolarTable}[self.manifest["grid"]["layout"]]
+        self.table = layout(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) for unit vectors wi, wr (directions, 3); nan where not computed."""
         if np.any(wi[:, 2] <= 0.0) or np.any(wr[:, 2] <= 0.0):
             raise ValueError("a direction lies on or below the horizon: the table knows only z > 0")
-        parts = range(0, len(wi), AT_ONCE)
-        found = [self.part(wi[first : first + AT_ONCE], wr[first : first + AT_ONCE]) for first in parts]
+        parts = [slice(first, first + AT_ONCE) for first in range(0, len(wi), AT_ONCE)]
+        found = [self.c_cos(wi[s], wr[s])[:, None] * self.table.value(*(-wi[s] - wr[s]).T) for s in parts]
         return np.concatenate([np.empty((0, 3)), *found])
-
-    def part(self, wi: Array, wr: Array) -> Array:
-        """XYZ = C cos(ti) sum_p w^p I_p(u, v), (u, v, w) = -wi - wr; bilinear between texel centres."""
-        u, v, w = (-wi - wr).T
-        column, row = self.texel(u), self.texel(v)
-        left, low = (np.clip(np.floor(index).astype(int), 0, self.n - 2) for index in (column, row))
-        a, b = column - left, row - low
-        total = np.zeros((len(w), 3))
-        corners = ((0, 0, (1 - a) * (1 - b)), (0, 1, a * (1 - b)), (1, 0, (1 - a) * b), (1, 1, a * b))
-        for up, right, weight in corners:
-            at = low + up, left + right
-            known = self.computed[at] | (weight == 0.0)
-            total += np.where(known, weight, np.nan)[:, None] * self.polynomial(self.i_p[at], w)
-        return np.asarray(self.c_cos(wi, wr)[:, None] * total)
-
-    def texel(self, u: Array) -> Array:
-        """Fractional texel index of u: u = 2 |t|^a sign(t), t = 2 i / (n - 1) - 1. Texture: (i + 1/2) / n."""
-        t = np.sign(u) * (np.abs(u) / 2.0) ** (1.0 / self.power)
-        return np.asarray(0.5 * (t + 1.0) * (self.n - 1))
-
-    def polynomial(self, i_p: NDArray[Any], w: Array) -> Array:
-        """sum_p w^p I_p by Horner's rule, from the highest p down."""
-        total = np.zeros((len(w), 3))
-        for p in range(len(self.scale) - 1, -1, -1):
-            total = total * w[:, None] + self.scale[p] * i_p[..., p].astype(float)
-        return total
 
     def c_cos(self, wi: Array, wr: Array) -> Array:
         """C cos(ti) = (R / divisor)^exponent (1 + wi.wr)^2 / (cos(tr) w^2), times V-cavity shadowing."""
@@ -78,21 +50,102 @@ class Bundle:
         return np.asarray(factor)
 
     def reflectance(self, cos: Array) -> Array:
-        """R(cos_half): 1, Schlick's term, or Fresnel's |r|^2 averaged over the samples of n + ik."""
-        material = self.manifest["material"]
-        if material["fresnel"] == "none":
+        """R(cos_half): Schlick's term, Fresnel's |r|^2 averaged over the samples of n + ik, or 1 without either."""
+        f0, samples = self.manifest["material"]["schlick_f0"], self.manifest["material"]["samples"]
+        if f0 is not None:
+            return np.asarray(f0 + (1.0 - f0) * (1.0 - cos) ** 5)
+        if samples is None:
             return np.ones_like(cos)
-        if material["fresnel"] == "schlick":
-            return np.asarray(material["schlick_f0"] + (1.0 - material["schlick_f0"]) * (1.0 - cos) ** 5)
-        samples = material["samples"]
         eta, cos = np.array(samples["n"]) + 1j * np.array(samples["k"]), cos[:, None]
         below = np.sqrt(1.0 - (1.0 - cos**2) / eta**2)
         r_s, r_p = (cos - eta * below) / (cos + eta * below), (eta * cos - below) / (eta * cos + below)
         return np.asarray(0.5 * (np.abs(r_s) ** 2 + np.abs(r_p) ** 2) @ np.array(samples["luminous_weight"]))
 
 
+class PolarTable:
+    """Cubic B-splines on rings and azimuths, Chebyshev polynomials in |w|; texels (ring, azimuth, output)."""
+
+    def __init__(self, grid: dict[str, Any], planes: list[NDArray[Any]], scale: list[list[float]]) -> None:
+        self.grid, outputs = grid, 4 * len(planes)
+        self.texels = np.concatenate([p * np.array(s) for p, s in zip(planes, scale, strict=True)], axis=-1)
+        basis = np.eye(outputs) if grid["basis"] is None else np.array(grid["basis"])
+        self.basis = basis.reshape(outputs, 3, grid["w_terms"])
+
+    def value(self, u: Array, v: Array, w: Array) -> Array:
+        """g(rho) sum_k T_k(2 |w| / w_max - 1) sum_o output_o(u, v) basis[o, channel, k]: (directions, 3)."""
+        rho = np.hypot(u, v)
+        x = np.clip(2.0 * np.abs(w) / np.sqrt(np.maximum(4.0 - rho**2, 1e-9)) - 1.0, -1.0, 1.0)
+        chebyshev = np.cos(np.arange(self.basis.shape[2]) * np.arccos(x)[:, None])
+        g = (1.0 + (rho / self.grid["envelope_radius"]) ** 2) ** -self.grid["envelope_exponent"]
+        ring, last = np.arcsinh(rho / self.grid["r0"]) / self.grid["step"], self.grid["height"] - 1
+        g[ring > last + 1e-6] = np.nan  # the scene does not reach there
+        outputs = self.interpolate(np.minimum(ring, last), self.azimuth(u, v))
+        return np.asarray(g[:, None] * np.einsum("no,ock,nk->nc", outputs, self.basis, chebyshev, optimize=True))
+
+    def azimuth(self, u: Array, v: Array) -> Array:
+        """Fractional column of (u, v), turned by -axis and stretched."""
+        cos, sin = np.cos(self.grid["axis_rad"]), np.sin(self.grid["axis_rad"])
+        angle = np.arctan2(cos * v - sin * u, self.grid["stretch"] * (cos * u + sin * v))
+        return np.asarray(angle / (2.0 * np.pi) % 1.0 * self.grid["width"])
+
+    def interpolate(self, ring: Array, azimuth: Array) -> Array:
+        """Outputs (directions, outputs) between texels, from the 4 x 4 around each place."""
+        total = np.zeros((len(ring), len(self.basis)))
+        rows, columns = np.floor(ring).astype(int) - 1, np.floor(azimuth).astype(int) - 1
+        for a, across in enumerate(spline(ring % 1.0)):
+            for b, along in enumerate(spline(azimuth % 1.0)):
+                total += (across * along)[:, None] * self.texels[self.place(rows + a, columns + b)]
+        return total
+
+    def place(self, row: NDArray[Any], column: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Texels of any row and column: through the origin, mirrored at the last ring, periodic around the turn."""
+        height, width = self.grid["height"], self.grid["width"]
+        column = (column + np.where(row < 0, width // 2, 0)) % width
+        return height - 1 - np.abs(height - 1 - np.abs(row)), column
+
+
+def spline(t: Array) -> Array:
+    """The weights (4, places) of a cubic B-spline's four texels."""
+    s = 1.0 - t
+    return np.stack([s**3, 4.0 - 3.0 * t**2 * (2.0 - t), 4.0 - 3.0 * s**2 * (2.0 - s), t**3]) / 6.0
+
+
+class TaylorTable:
+    """I_p on a grid of (u, v), bilinear between texels; i_p is (v, u, channel, p), computed is (v, u)."""
+
+    def __init__(self, grid: dict[str, Any], planes: list[NDArray[Any]], scale: list[float]) -> None:
+        self.i_p = np.stack([plane[..., :3] for plane in planes], axis=-1)
+        self.scale, self.computed = scale, planes[0][..., 3] == 1.0
+        self.n, self.power = int(grid["width"]), float(grid["power"])
+
+    def value(self, u: Array, v: Array, w: Array) -> Array:
+        """sum_p w^p I_p(u, v): (directions, 3)."""
+        column, row = self.texel(u), self.texel(v)
+        left, low = (np.clip(np.floor(index).astype(int), 0, self.n - 2) for index in (column, row))
+        a, b = column - left, row - low
+        total = np.zeros((len(w), 3))
+        corners = ((0, 0, (1 - a) * (1 - b)), (0, 1, a * (1 - b)), (1, 0, (1 - a) * b), (1, 1, a * b))
+        for up, right, weight in corners:
+            at = low + up, left + right
+            known = self.computed[at] | (weight == 0.0)
+            total += np.where(known, weight, np.nan)[:, None] * self.polynomial(self.i_p[at], w)
+        return total
+
+    def texel(self, u: Array) -> Array:
+        """Fractional texel index of u: u = 2 |t|^a sign(t), t = 2 i / (n - 1) - 1. Texture: (i + 1/2) / n."""
+        t = np.sign(u) * (np.abs(u) / 2.0) ** (1.0 / self.power)
+        return np.asarray(0.5 * (t + 1.0) * (self.n - 1))
+
+    def polynomial(self, i_p: NDArray[Any], w: Array) -> Array:
+        """sum_p w^p I_p by Horner's rule, from the highest p down."""
+        total = np.zeros((len(w), 3))
+        for p in range(len(self.scale) - 1, -1, -1):
+            total = total * w[:, None] + self.scale[p] * i_p[..., p].astype(float)
+        return total
+
+
 def read_rgba(path: Path) -> NDArray[Any]:
-    """The pixels (row, column, RGBA) of an EXR; row 0 is v = -2."""
+    """The pixels (row, column, RGBA) of an EXR; row 0 is its first line."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return np.stack([file.channels()[name].pixels for name in "RGBA"], axis=-1)
 

@@ -1,46 +1,21 @@
-"""manifest.json: its schema, and how it is filled from a config and its artifacts.
+"""manifest.json: its schema. A table's grid, images and losses are told in the terms of its layout.
 
 It holds nothing that differs between two publications of one content: no time, host, folder or run time.
 """
 
 import json
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from pipeline.bundle.material import MaterialEntry
-from pipeline.config import Config, Section
-from pipeline.digest import of_file
-from pipeline.optics.spectra import shortest_wavelength_nm
-from pipeline.store import Artifact
-from pipeline.tables import grid
+from pipeline.config import Section
 
 MANIFEST = "manifest.json"
-SCHEMA_VERSION: Literal[1] = 1
-STAGES = ("surface", "stack", "table", "render", "validate")
-_NOT_RECORDED = "not recorded"
-_LIBRARIES = ("numpy", "pyopencl", "zarr", "OpenEXR")
+SCHEMA_VERSION: Literal[2] = 2
+Normal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
-CONVENTIONS = {
-    "directions": "unit vectors pointing away from the surface; z is its normal, x grows with the column",
-    "y": "up: y grows with the height field's row index",
-    "azimuth": "from +x towards +y",
-    "uvw": "(u, v, w) = -wi - wr, wi towards the light, wr towards the viewer; so -2 <= w < 0",
-    "P": "P(f) = sum g exp(i k w h) exp(+2 pi i f.x) / sum g at f = (u, v) / lambda, k = 2 pi / lambda; by "
-    "this sign a plane rising towards +x reflects towards -x",
-    "window": "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch",
-    "boundary": "the patch repeats periodically under the window",
-    "I_p": "sum_p w^p I_p(u, v) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the "
-    "factors of the material that vary with wavelength inside the sum",
-    "RU": "reflectance unit: at 1 RU a flat mirror (|P(0)|^2 = 1) in its own reflection saturates a screen",
-}
-
-EVALUATION = (
-    "XYZ = C cos(theta_i) sum_p w^p I_p(u, v); I_p = scale_p * (R, G, B) where A = 1; "
-    "by Horner's rule from the highest p down"
-)
+# --- images --------------------------------------------------------------------------------------------
 
 
 class Image(Section):
@@ -53,12 +28,25 @@ class Image(Section):
     pixel_type: Literal["float", "half"]
 
 
-class TableImage(Image):
-    """I_p of one p: R, G, B hold X, Y, Z of I_p / scale, A is 1 where computed, else 0."""
+class TaylorImage(Image):
+    """I_p of one p = `index`: R, G, B hold X, Y, Z of I_p / scale, A is 1 where computed, else 0."""
 
-    p: Annotated[int, Field(ge=0)]
-    scale: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    layout: Literal["taylor"]
+    index: Annotated[int, Field(ge=0)]
+    scale: Normal
     half_subnormal_share: float | None
+
+
+class PolarImage(Image):
+    """Outputs 4 index ... 4 index + 3 in R, G, B, A, each over its scale."""
+
+    layout: Literal["polar"]
+    index: Annotated[int, Field(ge=0)]
+    scale: Annotated[list[Normal], Field(min_length=4, max_length=4)]
+    half_subnormal_share: float | None
+
+
+TableImage = Annotated[TaylorImage | PolarImage, Field(discriminator="layout")]
 
 
 class MapImage(Image):
@@ -70,8 +58,11 @@ class MapImage(Image):
     exposure_ru: float
 
 
-class Grid(Section):
-    """Where the texels of a table stand in (u, v)."""
+# --- grids ---------------------------------------------------------------------------------------------
+
+
+class TaylorGrid(Section):
+    """Where the texels of a Taylor table stand in (u, v)."""
 
     layout: Literal["taylor"]
     width: int
@@ -88,29 +79,56 @@ class Grid(Section):
     )
 
 
-class Colour(Section):
-    """The space of all numbers."""
+class PolarGrid(Section):
+    """Where the texels of a polar table stand in (u, v), and what is made of them.
 
-    space: str = "CIE XYZ, linear (not sRGB)"
-    observer: str
-    illuminant: dict[str, Any]
-    range_nm: list[float]
-    step_nm: float
-    white: str = "a perfect mirror in its own reflection has Y = 1 at 1 RU ('relative'); X and Z are the illuminant's"
-
-
-class Coverage(Section):
-    """What the table does not know.
-
-    unknown_share: of the (u, v) disc's light, beyond the scan's band: taken as dark. skipped_share: of the
-    disc's texels, not computed because no light and view of the scene reach them (A = 0).
-    known_radius: sqrt(u^2 + v^2) up to which every wavelength lies within the scan's band, at most 2.
+    basis: (outputs, 3, w_terms); None where every output is a term of its own.
     """
 
-    unknown_share: float
-    skipped_share: float
-    known_radius: float
-    band_limit_per_um: list[float]
+    layout: Literal["polar"]
+    width: int
+    height: int
+    r0: Normal
+    step: Normal
+    rho_max: Normal
+    stretch: Normal
+    axis_rad: float
+    w_terms: int
+    envelope_radius: Normal
+    envelope_exponent: float
+    basis: list[list[list[float]]] | None
+    rows: str = (
+        "row i (row 0 is the first line of the image) is the ring rho = r0 sinh(i step), rho = sqrt(u^2 + v^2), "
+        "step = asinh(rho_max / r0) / (height - 1); so i = asinh(rho / r0) / step"
+    )
+    columns: str = (
+        "column j is the azimuth with atan2(v', stretch u') = 2 pi j / width, (u', v') = (u, v) turned by -axis_rad: "
+        "u' = cos(axis_rad) u + sin(axis_rad) v, v' = cos(axis_rad) v - sin(axis_rad) u"
+    )
+    texture: str = "texel (i, j) has its centre at texture coordinate ((j + 1/2) / width, (i + 1/2) / height)"
+    interpolation: str = (
+        "cubic B-spline along both indices; texels are its coefficients, not values. At t = i - floor(i) the texels "
+        "floor(i) - 1, + 0, + 1, + 2 have the weights (1 - t)^3 / 6, (4 - 3 t^2 (2 - t)) / 6, "
+        "(4 - 3 (1 - t)^2 (1 + t)) / 6, t^3 / 6"
+    )
+    border: str = (
+        "columns are periodic; row -i is row i half a turn on, (-i, j) = (i, j + width / 2), for the first ring is "
+        "one point; beyond the last row they are mirrored, (height - 1 + i, j) = (height - 1 - i, j)"
+    )
+    outputs: str = "output o, interpolated, is channel o mod 4 (R, G, B, A) of table image o div 4, times its scale"
+    terms: str = (
+        "c[channel][k] = g(rho) sum_o output_o basis[o][channel][k], channels X, Y, Z; without a basis output o is "
+        "channel o div w_terms, k = o mod w_terms. g(rho) = (1 + (rho / envelope_radius)^2)^-envelope_exponent"
+    )
+    w_basis: str = (
+        "value[channel] = sum_k c[channel][k] T_k(x), Chebyshev's polynomials of x = 2 |w| / w_max - 1, "
+        "w_max = sqrt(4 - rho^2)"
+    )
+
+
+Grid = Annotated[TaylorGrid | PolarGrid, Field(discriminator="layout")]
+
+# --- errors --------------------------------------------------------------------------------------------
 
 
 class RelativeErrors(Section):
@@ -121,7 +139,38 @@ class RelativeErrors(Section):
     maximum: float
 
 
-class HalfPrecision(Section):
+class ColourErrors(Section):
+    """CIELAB differences at an exposure."""
+
+    exposure_ru: float
+    mean: float
+    percentile_99: float
+    maximum: float
+
+
+class RandomErrors(Section):
+    """Against the exact sum on random directions: Y of |P|^2, and colours."""
+
+    directions: int
+    power: RelativeErrors
+    colour: list[ColourErrors]
+
+
+class CertificateEntry(Section):
+    """What the table was planned for, and what it keeps on directions that its planning never saw.
+
+    measured: the mean CIELAB error at exposure_ru, within delta_e. reference: the exact sum's fast route against
+    the plain one.
+    """
+
+    delta_e: float
+    exposure_ru: float
+    measured: float
+    random: RandomErrors
+    reference: RelativeErrors
+
+
+class TaylorLoss(Section):
     """What storing the table in half floats adds, against the float table.
 
     relative_error_of_y: over so many "random" directions and the "mirror" directions of their lights (where a
@@ -129,12 +178,62 @@ class HalfPrecision(Section):
     of all computed values, those that half keeps with fewer than 11 bits.
     """
 
+    layout: Literal["taylor"]
     directions: int
     relative_error_of_y: dict[str, RelativeErrors]
     floor: float
     exposure_ru: float
     largest_delta_e: float
     subnormal_share: float
+
+
+class PolarLoss(Section):
+    """What few textures and half floats leave, on random directions.
+
+    textures: RGBA textures, of as many as `most_textures` that would hold everything. error: of what is stored,
+    against the exact sum. added: against the table before. added_in_mirror: the same in the mirror directions of the
+    lights, at 1 RU. subnormal_share: of all values, those that half keeps with fewer than 11 bits; None for float.
+    """
+
+    layout: Literal["polar"]
+    directions: int
+    textures: int
+    most_textures: int
+    error: ColourErrors
+    added: ColourErrors
+    added_in_mirror: ColourErrors
+    subnormal_share: float | None
+
+
+StorageLoss = Annotated[TaylorLoss | PolarLoss, Field(discriminator="layout")]
+
+# --- the whole -----------------------------------------------------------------------------------------
+
+
+class Colour(Section):
+    """The space of all numbers. step_nm: of the `wavelengths`; None where each ring has its own, at most so many."""
+
+    space: str = "CIE XYZ, linear (not sRGB)"
+    observer: str
+    illuminant: dict[str, Any]
+    range_nm: list[float]
+    step_nm: float | None
+    wavelengths: int
+    white: str = "a perfect mirror in its own reflection has Y = 1 at 1 RU ('relative'); X and Z are the illuminant's"
+
+
+class Coverage(Section):
+    """What the table does not know.
+
+    unknown_share: of the (u, v) disc's light, beyond the scan's band: taken as dark. skipped_share: of the
+    disc, not computed because no light and view of the scene reach it.
+    known_radius: sqrt(u^2 + v^2) up to which every wavelength lies within the scan's band, at most 2.
+    """
+
+    unknown_share: float
+    skipped_share: float
+    known_radius: float
+    band_limit_per_um: list[float]
 
 
 class MadeBy(Section):
@@ -155,7 +254,7 @@ class Provenance(Section):
 class Manifest(Section):
     """manifest.json, whole."""
 
-    schema_version: Literal[1]
+    schema_version: Literal[2]
     name: str
     version: str
     licence: str
@@ -171,92 +270,13 @@ class Manifest(Section):
     maps: list[MapImage]
     report: str | None
     coverage: Coverage
-    predicted_error: dict[str, Any]
+    plan: dict[str, Any]
+    certificate: CertificateEntry | None
     measured_error: dict[str, Any]
-    half_precision: HalfPrecision | None
+    storage_loss: StorageLoss | None
     surface: dict[str, Any]
     provenance: Provenance
 
     def text(self) -> str:
         """As it stands in the bundle."""
         return json.dumps(self.model_dump(mode="json"), indent=1, ensure_ascii=True, allow_nan=False) + "\n"
-
-
-def grid_entry(config: Config) -> Grid:
-    """The grid of a config's table."""
-    n = config.table.resolution
-    return Grid(layout=config.table.layout, width=n, height=n, power=config.table.power, u_max=grid.U_MAX)
-
-
-def units(config: Config) -> dict[str, str]:
-    """The unit of every kind of number in the bundle."""
-    absolute = config.material.normalisation == "absolute"
-    return {
-        "I_p": "1/sr" if absolute else "1",
-        "XYZ": "1/sr, for it is a BRDF times cos(theta_i)" if absolute else "RU",
-        "u, v, w": "1",
-        "lengths": "um",
-        "wavelengths": "nm",
-        "angles": "degrees in files, radians in formulas",
-    }
-
-
-def colour_entry(config: Config) -> Colour:
-    """Light and observer."""
-    return Colour(
-        observer=config.spectrum.observer,
-        illuminant=_illuminant(config),
-        range_nm=list(config.spectrum.range_nm),
-        step_nm=config.table.step_nm,
-    )
-
-
-def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
-    """What the scan's band and the scene leave out."""
-    table, band = inputs["table"].summary, inputs["surface"].summary["statistics"]["band_limit_per_um"]
-    known = 1e-3 * shortest_wavelength_nm(config.spectrum) * min(band)
-    return Coverage(
-        unknown_share=table["unknown_share"],
-        skipped_share=table["skipped_share"],
-        known_radius=min(grid.U_MAX, known),
-        band_limit_per_um=list(band),
-    )
-
-
-def made_by(inputs: Mapping[str, Artifact]) -> MadeBy:
-    """The tool, libraries and device that made the table, as recorded with it: never this machine's own."""
-    recorded = inputs["table"].record.get("provenance", {})
-    return MadeBy(
-        diffract_bake=str(recorded.get("diffract-bake", _NOT_RECORDED)),
-        stages={name: int(inputs[name].record.get("version", 0)) for name in STAGES},
-        libraries={name: str(recorded.get(name, _NOT_RECORDED)) for name in _LIBRARIES},
-        device=str(recorded.get("device", _NOT_RECORDED)),
-        driver=str(recorded.get("driver", _NOT_RECORDED)),
-    )
-
-
-def provenance(config: Config, inputs: Mapping[str, Artifact]) -> Provenance:
-    """Where the bundle comes from."""
-    return Provenance(config=resolved_config(config), artifacts={name: inputs[name].key for name in STAGES})
-
-
-def resolved_config(config: Config) -> dict[str, Any]:
-    """The whole config, files by name and content, without folders of this machine."""
-    resolved = config.model_dump(mode="json")
-    resolved["surface"]["path"] = None if config.surface.path is None else _named_file(config.surface.path)
-    resolved["spectrum"]["illuminant"] = _illuminant(config)
-    resolved["material"]["metal"] = _file_or_name(config.material.metal)
-    return resolved
-
-
-def _illuminant(config: Config) -> dict[str, Any]:
-    illuminant = config.spectrum.illuminant
-    return _file_or_name(illuminant) if isinstance(illuminant, str) else illuminant.model_dump()
-
-
-def _file_or_name(name: str) -> dict[str, Any]:
-    return _named_file(name) if name.lower().endswith(".csv") else {"name": name}
-
-
-def _named_file(path: str) -> dict[str, Any]:
-    return {"file": Path(path).name, "sha256": of_file(Path(path))}

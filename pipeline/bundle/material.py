@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.config import Config, Section
+from pipeline.config import Config, PolarLayout, Section
 from pipeline.optics import fresnel
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import trapezoid
@@ -29,6 +29,7 @@ REFLECTANCES = {
     "conductor": "R = sum over samples of luminous_weight (|r_s|^2 + |r_p|^2) / 2, Fresnel from air onto "
     "n + ik; the metal's colour at normal incidence is inside I_p",
 }
+INSIDE = "R = 1: the metal's reflectance, at every angle and wavelength, is inside the table"
 
 
 class Samples(Section):
@@ -90,14 +91,19 @@ class Medium:
 
 
 def medium(config: Config) -> Medium | None:
-    """The medium of a dielectric or a conductor; a metal is averaged as the eye's Y weighs it."""
+    """What reflects outside the table: a dielectric, or a metal averaged as the eye's Y weighs it."""
     if config.material.fresnel == "dielectric":
         return Medium(None, np.array([config.material.ior], dtype=complex), np.ones(1))
-    if config.material.fresnel == "conductor":
+    if config.material.fresnel == "conductor" and not _inside_table(config):
         quadrature = trapezoid(config.spectrum, config.mean_step_nm)
         index = fresnel.metal_index(config.material.metal, quadrature.lambda_nm)
         return Medium(quadrature.lambda_nm, index, quadrature.weights[:, 1])
     return None
+
+
+def _inside_table(config: Config) -> bool:
+    """Polar tables hold a metal's reflectance: rho and |w| fix the half angle."""
+    return config.material.fresnel == "conductor" and isinstance(config.table, PolarLayout)
 
 
 def entry(config: Config) -> MaterialEntry:
@@ -112,7 +118,7 @@ def entry(config: Config) -> MaterialEntry:
         # a file's folder is this machine's business
         metal=Path(material.metal).name if conductor else None,
         formula=FORMULA,
-        reflectance=REFLECTANCES[material.fresnel],
+        reflectance=INSIDE if _inside_table(config) else REFLECTANCES[material.fresnel],
         shadowing_formula=SHADOWING if material.shadowing else NO_SHADOWING,
         schlick_f0=float(fresnel.schlick(1.0, material.ior)) if material.fresnel == "schlick" else None,
         samples=None if found is None else found.samples(),
@@ -120,7 +126,7 @@ def entry(config: Config) -> MaterialEntry:
         divisor=_at_normal(config, found) if relative or conductor else 1.0,
         # the paper's F is squared as it is printed
         exponent=2 if relative and material.fresnel == "schlick" else 1,
-        reflectance_table=None if found is None or not conductor else _describe(found),
+        reflectance_table=_describe(found) if found is not None and conductor else None,
     )
 
 

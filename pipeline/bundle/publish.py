@@ -8,34 +8,30 @@ from importlib.resources import files
 from pathlib import Path
 
 from pipeline import scratch
-from pipeline.bundle import checksums, exr, material, precision, readme
-from pipeline.bundle import manifest as sections
-from pipeline.bundle.manifest import MANIFEST, Manifest, MapImage, TableImage
+from pipeline.bundle import checksums, entries, exr, layouts, material, readme
+from pipeline.bundle.manifest import MANIFEST, SCHEMA_VERSION, Manifest, MapImage, TableImage
+from pipeline.bundle.prepared import Prepared
 from pipeline.bundle.verify import summary, verify
 from pipeline.config import Config
 from pipeline.errors import DamagedError
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
-from pipeline.stages import table as table_stage
 from pipeline.stages.validate import REPORT
 from pipeline.store import Artifact, writing
-from pipeline.tables.taylor import TaylorTable
 
 EVALUATE, README = "evaluate.py", "README.md"
 TABLES, MAPS = "tables", "maps"
 _BESIDE = ".publishing-"
 # as pipeline.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
-_PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
 
 
 def publish(config: Config, inputs: Mapping[str, Artifact], out: Path, progress: Progress = silent) -> Path:
     """Writes the bundle `<name>-<version>+<digest>` under `out` and returns its folder.
 
-    inputs: the artifacts surface, stack, table, render and validate. The digest is over content, so the same
+    inputs: the artifacts of all stages of the config, by stage. The digest is over content, so the same
     content gives the same folder and a second time nothing is written. The folder appears by one rename.
-    Raises AccuracyError where half precision would lose the digits, DamagedError where the folder stands
-    already and is not what it was, StorageError where the disk refuses.
+    Raises AccuracyError where what is to be stored would not keep its digits or its budget, DamagedError where the
+    folder stands already and is not what it was, StorageError where the disk refuses.
     """
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
@@ -57,7 +53,7 @@ def published(config: Config, keys: Mapping[str, str], out: Path) -> Path | None
 
     Raises DamagedError where it stands and is not what it was.
     """
-    expected = {"config": sections.resolved_config(config), "artifacts": {n: keys[n] for n in sections.STAGES}}
+    expected = entries.provenance(config, keys).model_dump(mode="json")
     for page in sorted(out.glob(f"{config.name}-{config.publish.version}+*/{MANIFEST}")):
         try:
             found = json.loads(page.read_text(encoding="utf-8"))["provenance"]
@@ -94,11 +90,8 @@ def _place(folder: Path, target: Path) -> None:
 
 def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:
     """Every file but SHA256SUMS."""
-    table = table_stage.load(inputs["table"])
-    scale = precision.scales(table, config.publish.precision)
-    # measured first: it may refuse
-    half = precision.measure_half(config, table, scale) if config.publish.precision == "half" else None
-    tables = _write_tables(config, table, scale, folder, progress)
+    table = layouts.prepare(config, inputs)
+    tables = _write_tables(table, folder, progress)
     maps = _copy_maps(inputs["render"], folder)
     report = inputs["validate"].folder / REPORT
     if report.is_file():
@@ -108,69 +101,54 @@ def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progres
     if found is not None and described.reflectance_table is not None:
         _write_text(folder / material.REFLECTANCE, material.reflectance_csv(found))
     page = Manifest(
-        schema_version=sections.SCHEMA_VERSION,
+        schema_version=SCHEMA_VERSION,
         name=config.name,
         version=config.publish.version,
         licence=config.publish.licence or "not stated",
-        made_by=sections.made_by(inputs),
-        conventions=sections.CONVENTIONS,
-        units=sections.units(config),
-        evaluation=sections.EVALUATION,
-        grid=sections.grid_entry(config),
-        colour=sections.colour_entry(config),
+        made_by=entries.made_by(inputs),
+        conventions={**entries.CONVENTIONS, **table.conventions},
+        units=entries.units(config, table.holds),
+        evaluation=table.evaluation,
+        grid=table.grid,
+        colour=entries.colour(config, inputs),
         material=described,
         precision=config.publish.precision,
         tables=tables,
         maps=maps,
         report=REPORT if report.is_file() else None,
-        coverage=sections.coverage(config, inputs),
-        predicted_error={key: inputs["stack"].summary.get(key) for key in _PREDICTED},
+        coverage=entries.coverage(config, inputs),
+        plan=table.plan,
+        certificate=table.certificate,
         measured_error=inputs["validate"].summary,
-        half_precision=half,
+        storage_loss=table.loss,
         surface=inputs["surface"].summary,
-        provenance=sections.provenance(config, inputs),
+        provenance=entries.provenance(config, {name: artifact.key for name, artifact in inputs.items()}),
     )
     _write_text(folder / MANIFEST, page.text())
-    _write_text(folder / README, readme.text(page))
+    _write_text(folder / README, readme.text(page, table.files, table.shader))
     source = files("pipeline.bundle").joinpath(EVALUATE).read_text(encoding="utf-8")
     _write_text(folder / EVALUATE, source)
 
 
-def _write_tables(
-    config: Config, table: TaylorTable, scale: Array, folder: Path, progress: Progress
-) -> list[TableImage]:
-    """tables/I_00.exr ... and their entries."""
+def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[TableImage]:
+    """The table's images, and their entries."""
     (folder / TABLES).mkdir()
-    stored = config.publish.precision
-    lost = precision.subnormal_shares(table, scale) if stored == "half" else None
-    entries = []
-    for p, plane in enumerate(precision.planes(table, scale, stored)):
-        name = f"{TABLES}/I_{p:02d}.exr"
-        exr.write_rgba(folder / name, plane)
-        entries.append(
-            TableImage(
-                file=name,
-                width=plane.shape[1],
-                height=plane.shape[0],
-                channels=sorted(exr.CHANNELS),
-                pixel_type=stored,
-                p=p,
-                scale=float(scale[p]),
-                half_subnormal_share=None if lost is None else float(lost[p]),
-            )
-        )
-        progress("publish", 0.9 * (p + 1) / len(scale))
-    return entries
+    written = []
+    for image, pixels in table.images:
+        exr.write_rgba(folder / image.file, pixels)
+        written.append(image)
+        progress("publish", 0.9 * len(written) / table.count)
+    return written
 
 
 def _copy_maps(render: Artifact, folder: Path) -> list[MapImage]:
     """The render artifact's maps under maps/, and their entries."""
     (folder / MAPS).mkdir()
-    entries = []
+    copied = []
     for found in render.summary["maps"]:
         for name in (found["exr"], found["png"]):
             shutil.copyfile(render.folder / name, folder / MAPS / name)
-        entries.append(
+        copied.append(
             MapImage(
                 file=f"{MAPS}/{found['exr']}",
                 width=render.summary["size"],
@@ -183,7 +161,7 @@ def _copy_maps(render: Artifact, folder: Path) -> list[MapImage]:
                 exposure_ru=render.summary["exposure_ru"],
             )
         )
-    return entries
+    return copied
 
 
 def _write_text(path: Path, text: str) -> None:

@@ -1,45 +1,28 @@
 """README.md of a bundle: what a person who writes a shader needs, with this bundle's numbers."""
 
-from pipeline.bundle.manifest import Manifest
+from pipeline.bundle.manifest import CertificateEntry, Manifest, PolarLoss, StorageLoss
+from pipeline.bundle.material import MaterialEntry
 
 _TEXT = """\
 # {name} {version}
 
-Diffraction of light by a nanostructured surface, baked by diffract-bake {tool} ({layout} layout, [D14]).
+Diffraction of light by a nanostructured surface, baked by diffract-bake {tool} ({layout} layout).
 Licence of the scan: {licence}.
 
 | file | what it holds |
 |---|---|
 | `manifest.json` | every convention, number, error and setting; read this first |
-| `tables/I_00.exr` ... `{last}` | I_p(u, v), p = 0 ... {top}: {width} x {height} texels, RGBA {precision} |
+{files}
 | `evaluate.py` | the look-up in one page of Python (numpy, OpenEXR): what a shader must reproduce |
 {optional}| `maps/` | BRDF maps: EXR (`brdf.X`, `brdf.Y`, `brdf.Z` at 1 RU) and PNG previews |
 | `SHA256SUMS` | digests of all files; its own digest begins with the 12 digits that end the folder's name |
 
-## In a shader
+{errors}## In a shader
 
 Directions `wi` (light) and `wr` (view) are unit vectors away from the surface in its tangent frame: z the
 normal, x and y the scan's axes, y up. {space}.
 
-R, G, B are X, Y, Z of `I_p / scale_p`; A is 1 where the texel was computed, else 0: treat A < 1 as "unknown".
-RGBA because GPUs lack three-channel half floats. Load the images as *data*: no gamma, no flip. The first line
-of the image is v = -2 and lies at texture coordinate 0.
-
-    const float N = {width}.0, A = {power};              // texels along u and v; the grid's exponent
-    float coordinate(float u) {{                     // from [-2, 2] to texture coordinates, texel centres
-        float t = sign(u) * pow(0.5 * abs(u), 1.0 / A);
-        return (0.5 * (t + 1.0) * (N - 1.0) + 0.5) / N;
-    }}
-    vec3 uvw = -wi - wr;
-    vec2 at = vec2(coordinate(uvw.x), coordinate(uvw.y));
-    vec3 sum = vec3(0.0);
-    for (int p = {top}; p >= 0; --p)                  // Horner; scale[] from manifest.json
-        sum = sum * uvw.z + scale[p] * texture(I, vec3(at, p)).rgb;
-    vec3 xyz = C(wi, wr) * wi.z * sum;               // under 1 RU
-
-Filter bilinearly, without mipmaps, clamped to the edge. Texture units round filter weights to about 1/256:
-where that shows, fetch four texels and mix them yourself. The sum cancels: keep it in float32, never in half.
-
+{shader}
 {formula}
 {reflectance}
 {shadowing}
@@ -52,39 +35,92 @@ divisor = {divisor!r}, exponent = {exponent}{f0}.
     python evaluate.py directions.csv        # rows theta_i,phi_i,theta_r,phi_r in degrees -> X,Y,Z
 
 `nan` stands where the table was not computed. Or `diffract-bake verify` on this folder.
-
-[D14] Dhillon et al. 2014, Interactive Diffraction from Biological Nanostructures.
 """
+_CERTIFICATE = (
+    "The table was planned for a mean CIELAB error of {planned:g} at {exposure:g} RU. On {directions} random\n"
+    "directions that its planning never saw it keeps {mean:.3g} (99th percentile {tail:.3g}, maximum {worst:.3g})\n"
+    "against the exact sum."
+)
+_STORED = (
+    "These files hold it in {textures} of {most} textures, in {precision}. Against the exact sum, on {directions}\n"
+    "other directions: mean {mean:.3g}, 99th percentile {tail:.3g}, maximum {worst:.3g}. Against the table before:\n"
+    "mean {added:.3g}, and {mirror}."
+)
 
 
-def text(manifest: Manifest) -> str:
-    """README.md."""
+def text(manifest: Manifest, files: str, shader: str) -> str:
+    """README.md; `files` and `shader` are what the table's layout has to say."""
     material = manifest.material
-    optional = "| `report.html` | measured errors, with pictures |\n" if manifest.report else ""
-    if material.reflectance_table is not None:
-        table = material.reflectance_table
-        optional += (
-            f"| `{table.file}` | R on {table.nodes} nodes of cos_half, for linear interpolation (error "
-            f"{table.largest_error:.1g}) |\n"
-        )
     return _TEXT.format(
         name=manifest.name,
         version=manifest.version,
         tool=manifest.made_by.diffract_bake,
         layout=manifest.grid.layout,
         licence=manifest.licence,
-        last=manifest.tables[-1].file,
-        top=manifest.tables[-1].p,
-        width=manifest.grid.width,
-        height=manifest.grid.height,
-        precision=manifest.precision,
-        optional=optional,
+        files=files,
+        optional=_optional(manifest.report, material),
+        errors=_errors(manifest),
         space=f"Colours are {manifest.colour.space}",
-        power=manifest.grid.power,
+        shader=shader,
         formula=material.formula,
         reflectance=material.reflectance,
         shadowing=material.shadowing_formula,
         divisor=material.divisor,
         exponent=material.exponent,
         f0="" if material.schlick_f0 is None else f", F0 = {material.schlick_f0!r}",
+    )
+
+
+def _optional(report: str | None, material: MaterialEntry) -> str:
+    """Lines of files that not every bundle has."""
+    lines = "| `report.html` | measured errors, with pictures |\n" if report else ""
+    if material.reflectance_table is not None:
+        table = material.reflectance_table
+        lines += (
+            f"| `{table.file}` | R on {table.nodes} nodes of cos_half, for linear interpolation (error "
+            f"{table.largest_error:.1g}) |\n"
+        )
+    return lines
+
+
+def _errors(manifest: Manifest) -> str:
+    """The section on errors, where there is something to be said."""
+    found = []
+    if manifest.certificate is not None:
+        found.append(_certified(manifest.certificate))
+    if manifest.storage_loss is not None:
+        found.append(_stored(manifest.storage_loss, manifest.precision))
+    return "## How exact it is\n\n" + "\n\n".join(found) + "\n\n" if found else ""
+
+
+def _certified(certificate: CertificateEntry) -> str:
+    exposure = certificate.exposure_ru
+    colour = next(error for error in certificate.random.colour if error.exposure_ru == exposure)
+    return _CERTIFICATE.format(
+        planned=certificate.delta_e,
+        exposure=exposure,
+        directions=certificate.random.directions,
+        mean=colour.mean,
+        tail=colour.percentile_99,
+        worst=colour.maximum,
+    )
+
+
+def _stored(loss: StorageLoss, precision: str) -> str:
+    if not isinstance(loss, PolarLoss):
+        return (
+            f"Half floats change colours by up to dE {loss.largest_delta_e:.3g} at {loss.exposure_ru:g} RU, on\n"
+            f"{loss.directions} random directions and the mirror directions of their lights."
+        )
+    mirror = loss.added_in_mirror
+    return _STORED.format(
+        textures=loss.textures,
+        most=loss.most_textures,
+        precision=precision,
+        mean=loss.error.mean,
+        tail=loss.error.percentile_99,
+        worst=loss.error.maximum,
+        directions=loss.directions,
+        added=loss.added.mean,
+        mirror=f"{mirror.mean:.3g} in the lights' mirror directions at {mirror.exposure_ru:g} RU",
     )

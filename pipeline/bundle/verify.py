@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from pipeline import digest
 from pipeline.bundle import checksums, exr
 from pipeline.bundle.checksums import SUMS
-from pipeline.bundle.manifest import MANIFEST, Image, Manifest
+from pipeline.bundle.manifest import MANIFEST, Image, Manifest, PolarGrid
 
 
 def verify(folder: Path) -> list[str]:
@@ -78,14 +78,26 @@ def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
     called = f"{manifest.name}-{manifest.version}"
     if folder.resolve().name.rpartition("+")[0] != called:
         faults.append(f"{MANIFEST}: is of {called}, but the folder is named {folder.resolve().name}")
-    if [table.p for table in manifest.tables] != list(range(len(manifest.tables))):
-        faults.append(f"{MANIFEST}: tables: expected p = 0, 1, ... in order")
+    if [table.index for table in manifest.tables] != list(range(len(manifest.tables))):
+        faults.append(f"{MANIFEST}: tables: expected index = 0, 1, ... in order")
+    if isinstance(manifest.grid, PolarGrid) and not _basis_fits(manifest.grid, len(manifest.tables)):
+        faults.append(f"{MANIFEST}: grid: {len(manifest.tables)} tables do not hold what basis and w_terms ask for")
     for table in manifest.tables:
+        if table.layout != manifest.grid.layout:
+            faults.append(f"{MANIFEST}: {table.file} is not of the grid's layout")
         if (table.width, table.height) != (manifest.grid.width, manifest.grid.height):
             faults.append(f"{MANIFEST}: {table.file} is not of the grid's size")
         if table.pixel_type != manifest.precision or set(table.channels) != set(exr.CHANNELS):
             faults.append(f"{MANIFEST}: {table.file} is not RGBA of precision {manifest.precision}")
     return faults
+
+
+def _basis_fits(grid: PolarGrid, images: int) -> bool:
+    """Whether the basis is (outputs, 3, w_terms) for the outputs that the images hold."""
+    if grid.basis is None:
+        return 4 * images == 3 * grid.w_terms
+    shapes = {(len(output), *(len(channel) for channel in output)) for output in grid.basis}
+    return len(grid.basis) == 4 * images and shapes == {(3, *3 * (grid.w_terms,))}
 
 
 def _image_faults(folder: Path, image: Image, unharmed: set[str]) -> list[str]:

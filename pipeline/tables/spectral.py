@@ -1,7 +1,7 @@
 """The spectral form of a table: I_lambda(u, v, w) = |P|^2 from E itself, with no integration, for spectral renderers.
 
-I_lambda(u, v, w) = E(rho / lambda, phi, 2 pi |w| / lambda): cubic splines over azimuths, Lagrange's polynomials over radii,
-Chebyshev's over s. One table answers every wavelength from the shortest it was made for.
+I_lambda(u, v, w) = E(rho / lambda, phi, 2 pi |w| / lambda): cubic splines over azimuths, Lagrange's polynomials over
+radii, Chebyshev's over s. One table answers every wavelength from the shortest it was made for.
 """
 
 from dataclasses import dataclass

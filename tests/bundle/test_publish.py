@@ -13,11 +13,11 @@ import OpenEXR
 import pytest
 
 from pipeline.bundle import checksums, exr
-from pipeline.bundle.manifest import Manifest
+from pipeline.bundle.manifest import Manifest, TaylorGrid
 from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
-from pipeline.stages import table as table_stage
+from pipeline.stages import taylor_table
 from pipeline.tables import grid
 
 from .conftest import SCENE, Baker, small
@@ -52,18 +52,19 @@ def test_what_a_bundle_holds(bundle: Path) -> None:
 
 
 def test_texels_are_the_table(bake: Baker, bundle: Path) -> None:
-    table = table_stage.load(bake(small())["table"])
+    table = taylor_table.load(bake(small())["table"])
     for entry in manifest_of(bundle).tables:
         with OpenEXR.File(str(bundle / entry.file), separate_channels=True) as file:
             assert file.header()["colorInteropID"] == "data"
             channels = {name: channel.pixels for name, channel in file.channels().items()}
         for c, name in enumerate("RGB"):
-            np.testing.assert_array_equal(channels[name], table.values[:, :, c, entry.p])
+            np.testing.assert_array_equal(channels[name], table.values[:, :, c, entry.index])
         np.testing.assert_array_equal(channels["A"] == 1.0, table.computed)
 
 
 def test_the_mapping_told_is_the_grids(bundle: Path) -> None:
     told = manifest_of(bundle).grid
+    assert isinstance(told, TaylorGrid)
     t = 2.0 * np.arange(told.width) / (told.width - 1) - 1.0
     u = told.u_max * np.abs(t) ** told.power * np.sign(t)
     np.testing.assert_allclose(u, grid.nodes(told.width, told.power), rtol=1e-14, atol=1e-15)
@@ -73,7 +74,7 @@ def test_the_mapping_told_is_the_grids(bundle: Path) -> None:
 def test_the_manifest_tells_errors_coverage_and_origin(bake: Baker, bundle: Path) -> None:
     inputs, told = bake(small()), manifest_of(bundle)
     assert told.measured_error == inputs["validate"].summary
-    assert told.predicted_error["order"] == inputs["stack"].summary["order"]
+    assert told.plan["order"] == inputs["stack"].summary["order"]
     assert told.coverage.unknown_share == inputs["table"].summary["unknown_share"]
     # pitch 0.1 um knows frequencies to 5 /um, light of 380 nm asks there at 5 * 0.38
     assert told.coverage.known_radius == pytest.approx(1.9)

@@ -1,6 +1,7 @@
 """Verify finds whatever differs, and reads nothing outside the folder."""
 
 import hashlib
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,9 @@ from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError
 
-from .conftest import Baker, small
+from .conftest import LAYOUTS, Baker, small
+
+FIRST = {"taylor": "tables/I_00.exr", "polar": "tables/T_00.exr"}
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +36,18 @@ def forged(folder: Path, harm: Callable[[Path], None]) -> Path:
     harm(folder)
     (folder / checksums.SUMS).unlink()
     return folder.rename(folder.parent / f"{folder.name.rpartition('+')[0]}+{checksums.write(folder)}")
+
+
+def replacing(before: str, after: str) -> Callable[[Path], None]:
+    """Harm to the manifest's text."""
+
+    def harm(folder: Path) -> None:
+        path = folder / "manifest.json"
+        text = path.read_text(encoding="utf-8")
+        assert before in text
+        path.write_text(text.replace(before, after, 1), encoding="utf-8")
+
+    return harm
 
 
 def names(folder: Path) -> list[str]:
@@ -55,6 +70,15 @@ def test_every_missing_file_is_found(bundle: Path) -> None:
         (bundle / name).rename(bundle.parent / "away")
         assert any(f"{name} is missing" in fault for fault in verify(bundle)), name
         (bundle.parent / "away").rename(bundle / name)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_tables_of_either_layout_are_checked(bake: Baker, tmp_path: Path, layout: str) -> None:
+    config = small(layout)
+    folder = publish(config, bake(config), tmp_path)
+    assert verify(folder) == []
+    empty = forged(folder, lambda folder: exr.write_rgba(folder / FIRST[layout], np.zeros((2, 2, 4), np.float32)))
+    assert {fault.split(":")[0] for fault in verify(empty)} == {FIRST[layout]}
 
 
 def test_an_extra_file_is_found(bundle: Path) -> None:
@@ -109,24 +133,42 @@ def test_sums_that_are_no_text(bundle: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "fault"),
     [
-        ('"schema_version": 1', '"schema_version": 2', "schema_version"),
-        ('"schema_version": 1', '"schema_version": 1, "more": 0', "more"),
-        ('"file": "tables/I_00.exr"', '"file": "../I_00.exr"', "tables.0.file"),
+        ('"schema_version": 2', '"schema_version": 1', "schema_version"),
+        ('"schema_version": 2', '"schema_version": 2, "more": 0', "more"),
+        ('"file": "tables/I_00.exr"', '"file": "../I_00.exr"', "tables.0.taylor.file"),
         ('"file": "tables/I_00.exr"', '"file": "tables/none.exr"', "names tables/none.exr, which is missing"),
         ('"version": "1.0.0"', '"version": "1.0.1"', "is of small-1.0.1"),
-        ('"p": 0', '"p": 7', "expected p = 0, 1"),
+        ('"index": 0', '"index": 7', "expected index = 0, 1"),
         ('"height": 41', '"height": 43', "not of the grid's size"),
         ('"precision": "float"', '"precision": "half"', "not RGBA of precision half"),
     ],
 )
 def test_a_manifest_that_contradicts(bundle: Path, before: str, after: str, fault: str) -> None:
+    assert any(fault in line for line in verify(forged(bundle, replacing(before, after))))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "fault"),
+    [
+        ('"w_terms": 12', '"w_terms": 8', "do not hold what basis and w_terms ask for"),
+        ('"layout": "polar",\n   "index": 0', '"layout": "taylor",\n   "index": 0', "tables.0.taylor"),
+        ('"basis": null', '"basis": [[[1.0]]]', "do not hold what basis and w_terms ask for"),
+    ],
+)
+def test_a_polar_manifest_that_contradicts(bake: Baker, tmp_path: Path, before: str, after: str, fault: str) -> None:
+    folder = publish(small("polar"), bake(small("polar")), tmp_path)
+    assert any(fault in line for line in verify(forged(folder, replacing(before, after))))
+
+
+def test_tables_of_another_layout_than_the_grid_are_found(bake: Baker, tmp_path: Path) -> None:
     def harm(folder: Path) -> None:
         path = folder / "manifest.json"
-        text = path.read_text(encoding="utf-8")
-        assert before in text
-        path.write_text(text.replace(before, after, 1), encoding="utf-8")
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest["tables"][1] |= {"layout": "taylor", "scale": 1.0}
+        path.write_text(json.dumps(manifest), encoding="utf-8")
 
-    assert any(fault in line for line in verify(forged(bundle, harm)))
+    folder = publish(small("polar"), bake(small("polar")), tmp_path)
+    assert verify(forged(folder, harm)) == ["manifest.json: tables/T_01.exr is not of the grid's layout"]
 
 
 @pytest.mark.parametrize(

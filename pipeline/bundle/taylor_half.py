@@ -2,28 +2,26 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.bundle.manifest import HalfPrecision, RelativeErrors
+from pipeline.bundle import half
+from pipeline.bundle.manifest import RelativeErrors, TaylorLoss
 from pipeline.config import Config
+from pipeline.directions import random_pairs
 from pipeline.errors import AccuracyError
 from pipeline.evaluate import relative_unit, table_evaluator
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.tables.taylor import TaylorTable
-from pipeline.validation import MIRROR_FLOOR, RANDOM_DIRECTIONS, mirror_luminance, random_pairs, relative_error
+from pipeline.validation import MIRROR_FLOOR, RANDOM_DIRECTIONS, mirror_luminance, relative_error
 
-# a scaled table peaks in [2^14, 2^15): one octave below half's largest number is left to filters that sum
-_PEAK_EXPONENT = 14
-# smaller scales are no normal float32, which is what a shader multiplies by
-_LEAST_EXPONENT = -126
-_HALF_NORMAL = 2.0**-14
-_HALF_EXPOSURE_RU = 7500.0
+_EXPOSURE_RU, _SEED = 7500.0, 20141101
 # largest 99th percentile of Y's relative error. Measured at 501 x 501: 0.07 and 0.2 % (random, mirror
 # directions) for heights of 0.37 um, 8 and 4000 % for 0.7 um. The median says little: most are dark
-_MOST_HALF_ERROR = 0.1
+_MOST_ERROR = 0.1
 # planes are gathered from (v, u, channel, p) so many at a time: 16 float32 are a cache line
 _PLANES_AT_ONCE = 16
 
@@ -31,14 +29,10 @@ _PLANES_AT_ONCE = 16
 def scales(table: TaylorTable, precision: str) -> Array:
     """What each p's texels are divided by, (P,): 1 for float, for half a power of two that fits the peak."""
     peak = np.max(np.abs(table.values), axis=(0, 1, 2)).astype(float)
-    if precision == "float":
-        return np.ones_like(peak)
-    _, exponent = np.frexp(peak)  # peak = m 2^exponent, m in [1/2, 1)
-    exponent = np.maximum(exponent - 1 - _PEAK_EXPONENT, _LEAST_EXPONENT)
-    return np.where(peak > 0.0, np.ldexp(1.0, exponent), 1.0)
+    return half.scales(peak) if precision == "half" else np.ones_like(peak)
 
 
-def planes(table: TaylorTable, scale: Array, precision: str) -> Iterator[NDArray[np.floating]]:
+def planes(table: TaylorTable, scale: Array, precision: str) -> Iterator[NDArray[np.floating[Any]]]:
     """RGBA texels (v, u, 4) of p = 0, 1, ...: X, Y, Z of I_p / scale_p and 1 where computed."""
     kind = np.float16 if precision == "half" else np.float32
     rgba = np.empty((*table.computed.shape, 4), dtype=kind)
@@ -52,8 +46,8 @@ def planes(table: TaylorTable, scale: Array, precision: str) -> Iterator[NDArray
 
 def subnormal_shares(table: TaylorTable, scale: Array) -> Array:
     """Share of the computed values of each p, (P,), that half keeps with fewer than 11 bits or none."""
-    stored = np.abs(table.values[table.computed]) / scale.astype(np.float32)
-    return np.asarray(np.mean((stored > 0.0) & (stored < _HALF_NORMAL), axis=(0, 1)))
+    stored = table.values[table.computed] / scale.astype(np.float32)
+    return np.asarray(np.mean(half.subnormal(stored), axis=(0, 1)))
 
 
 def in_half(table: TaylorTable, scale: Array) -> TaylorTable:
@@ -62,13 +56,13 @@ def in_half(table: TaylorTable, scale: Array) -> TaylorTable:
     return replace(table, values=(table.values / factor).astype(np.float16).astype(np.float32) * factor)
 
 
-def measure_half(config: Config, table: TaylorTable, scale: Array) -> HalfPrecision:
+def measure(config: Config, table: TaylorTable, scale: Array) -> TaylorLoss:
     """The half table against the float table. Raises AccuracyError where half loses the digits.
 
     On random directions, and on as many mirror directions: random ones miss the narrow lobes that hold nearly
     all light of a periodic surface, and |w| and with it the cancellation are largest in the mirror's.
     """
-    wi, wr = random_pairs(config, RANDOM_DIRECTIONS)
+    wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
     rounded = in_half(table, scale)
     errors, worst, unit = {}, 0.0, relative_unit(config)
     for name, views in (("random", wr), ("mirror", wi * [-1.0, -1.0, 1.0])):
@@ -79,30 +73,31 @@ def measure_half(config: Config, table: TaylorTable, scale: Array) -> HalfPrecis
         if known.any():
             found = relative_error(after[:, 1] / mirror, before[:, 1] / mirror, MIRROR_FLOOR)
             errors[name] = RelativeErrors(**asdict(found))
-            worst = max(worst, float(np.max(delta_e(after / unit, before / unit, _HALF_EXPOSURE_RU))))
-    half = HalfPrecision(
+            worst = max(worst, float(np.max(delta_e(after / unit, before / unit, _EXPOSURE_RU))))
+    loss = TaylorLoss(
+        layout="taylor",
         directions=len(wi),
         relative_error_of_y=errors,
         floor=MIRROR_FLOOR,
-        exposure_ru=_HALF_EXPOSURE_RU,
+        exposure_ru=_EXPOSURE_RU,
         largest_delta_e=worst,
         subnormal_share=float(np.mean(subnormal_shares(table, scale))),
     )
-    _refuse_lost_digits(half)
-    return half
+    _refuse_lost_digits(loss)
+    return loss
 
 
-def _refuse_lost_digits(half: HalfPrecision) -> None:
-    tail = {name: error.percentile_99 for name, error in half.relative_error_of_y.items()}
-    if all(error <= _MOST_HALF_ERROR for error in tail.values()):
+def _refuse_lost_digits(loss: TaylorLoss) -> None:
+    tail = {name: error.percentile_99 for name, error in loss.relative_error_of_y.items()}
+    if all(error <= _MOST_ERROR for error in tail.values()):
         return
     told = ", ".join(
         f"{100 * error.median:.3g} % in the median and {100 * error.percentile_99:.3g} % at the 99th "
-        f"percentile over {half.directions} {name} directions"
-        for name, error in half.relative_error_of_y.items()
+        f"percentile over {loss.directions} {name} directions"
+        for name, error in loss.relative_error_of_y.items()
     )
     raise AccuracyError(
         'publish.precision = "half" loses the digits of this series, because its terms cancel: Y changes by '
-        f"{told} ({100 * _MOST_HALF_ERROR:g} % allowed), colours by up to dE {half.largest_delta_e:.3g} at "
-        f'{half.exposure_ru:g} RU. Set publish.precision = "float"'
+        f"{told} ({100 * _MOST_ERROR:g} % allowed), colours by up to dE {loss.largest_delta_e:.3g} at "
+        f'{loss.exposure_ru:g} RU. Set publish.precision = "float"'
     )

@@ -1,4 +1,4 @@
-"""Half precision: scales, what it costs, and when it is refused."""
+"""The paper's tables in half floats: scales, what it costs, and when it is refused."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,16 +7,17 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from pipeline.bundle import precision
+from pipeline.bundle import taylor_half
+from pipeline.bundle.manifest import TaylorLoss
 from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
-from pipeline.errors import AccuracyError
+from pipeline.directions import random_pairs
+from pipeline.errors import AccuracyError, ConfigError
 from pipeline.evaluate import table_evaluator
 from pipeline.optics.colour_error import delta_e
-from pipeline.stages import table as table_stage
+from pipeline.stages import taylor_table
 from pipeline.tables.taylor import TaylorTable
-from pipeline.validation import random_pairs
 
 from .conftest import Baker, small
 from .test_publish import manifest_of
@@ -26,11 +27,11 @@ HALF = {"precision": "half"}
 
 @pytest.fixture(scope="module")
 def table(bake: Baker) -> TaylorTable:
-    return table_stage.load(bake(small())["table"])
+    return taylor_table.load(bake(small())["table"])
 
 
 def test_scales_are_powers_of_two_that_fill_half(table: TaylorTable) -> None:
-    scale = precision.scales(table, "half")
+    scale = taylor_half.scales(table, "half")
     mantissa, _ = np.frexp(scale)
     assert np.all(mantissa == 0.5)
     peak = np.abs(table.values).max(axis=(0, 1, 2)) / scale
@@ -43,17 +44,17 @@ def test_scales_are_powers_of_two_that_fill_half(table: TaylorTable) -> None:
 def test_an_empty_or_vanishing_plane_has_a_scale(table: TaylorTable) -> None:
     for value in (0.0, 1e-44):
         values = np.full_like(table.values, value)
-        scale = precision.scales(replace(table, values=values), "half")
+        scale = taylor_half.scales(replace(table, values=values), "half")
         assert np.all(np.isfinite(values / scale.astype(np.float32)))
 
 
 def test_float_is_stored_as_it_is(table: TaylorTable) -> None:
-    assert np.all(precision.scales(table, "float") == 1.0)
+    assert np.all(taylor_half.scales(table, "float") == 1.0)
 
 
 def test_half_keeps_eleven_bits(table: TaylorTable) -> None:
-    scale = precision.scales(table, "half")
-    error = np.abs(precision.in_half(table, scale).values - table.values)
+    scale = taylor_half.scales(table, "half")
+    error = np.abs(taylor_half.in_half(table, scale).values - table.values)
     assert np.all(error <= np.maximum(2.0**-11 * np.abs(table.values), 2.0**-25 * scale))
 
 
@@ -65,15 +66,16 @@ def test_a_half_bundle_errs_as_it_says(bake: Baker, tmp_path: Path) -> None:
     told = manifest_of(folder)
     with OpenEXR.File(str(folder / told.tables[0].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(np.float16)}
-    wi, wr = random_pairs(config, 2000)
-    exact = table_evaluator(table_stage.load(inputs["table"]), config)
+    wi, wr = random_pairs(None, 2000, taylor_half._SEED)
+    exact = table_evaluator(taylor_table.load(inputs["table"]), config)
     evaluate = bundle_evaluator(folder)
     mirrored = wi * [-1.0, -1.0, 1.0]
-    assert told.half_precision is not None
+    loss = told.storage_loss
+    assert isinstance(loss, TaylorLoss)
     worst = max(delta_e(evaluate(wi, r), exact(wi, r), 7500.0).max() for r in (wr, mirrored))
-    assert told.half_precision.largest_delta_e == pytest.approx(worst)
+    assert loss.largest_delta_e == pytest.approx(worst)
     mirror = np.abs(evaluate(wi, mirrored)[:, 1] / exact(wi, mirrored)[:, 1] - 1.0)
-    assert told.half_precision.relative_error_of_y["mirror"].maximum == pytest.approx(mirror.max(), rel=1e-6)
+    assert loss.relative_error_of_y["mirror"].maximum == pytest.approx(mirror.max(), rel=1e-6)
     assert all(0.0 <= (entry.half_subnormal_share or 0.0) < 1.0 for entry in told.tables)
 
 
@@ -88,6 +90,12 @@ def test_a_series_whose_terms_cancel_is_refused(bake: Baker, tmp_path: Path) -> 
 def test_a_scene_without_mirror_directions_is_measured(bake: Baker, tmp_path: Path) -> None:
     scene = {"lights": [{"theta_deg": 60.0}], "views": {"theta_max_deg": 20.0}}
     config = small(scene=scene, render={"lights": scene["lights"]}, publish=HALF)
-    told = manifest_of(publish(config, bake(config), tmp_path)).half_precision
-    assert told is not None
+    told = manifest_of(publish(config, bake(config), tmp_path)).storage_loss
+    assert isinstance(told, TaylorLoss)
     assert set(told.relative_error_of_y) == {"random"}
+
+
+def test_textures_are_the_polar_layouts(bake: Baker, tmp_path: Path) -> None:
+    config = small(publish={"textures": 3})
+    with pytest.raises(ConfigError, match=r"publish\.textures: 3 textures hold a polar table only"):
+        publish(config, bake(config), tmp_path)

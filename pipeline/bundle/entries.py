@@ -1,0 +1,102 @@
+"""What fills a manifest whatever the table's layout: from a config and its artifacts."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pipeline.bundle.manifest import Colour, Coverage, MadeBy, Provenance
+from pipeline.config import Config, TaylorLayout
+from pipeline.digest import of_file
+from pipeline.optics.spectra import shortest_wavelength_nm
+from pipeline.store import Artifact
+from pipeline.tables import grid
+
+_NOT_RECORDED = "not recorded"
+_LIBRARIES = ("numpy", "pyopencl", "zarr", "OpenEXR")
+
+CONVENTIONS = {
+    "directions": "unit vectors pointing away from the surface; z is its normal, x grows with the column",
+    "y": "up: y grows with the height field's row index",
+    "azimuth": "from +x towards +y",
+    "uvw": "(u, v, w) = -wi - wr, wi towards the light, wr towards the viewer; so -2 <= w < 0",
+    "P": "P(f) = sum g exp(i k w h) exp(+2 pi i f.x) / sum g at f = (u, v) / lambda, k = 2 pi / lambda; by "
+    "this sign a plane rising towards +x reflects towards -x",
+    "window": "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch",
+    "boundary": "the patch repeats periodically under the window",
+    "RU": "reflectance unit: at 1 RU a flat mirror (|P(0)|^2 = 1) in its own reflection saturates a screen",
+}
+
+
+def units(config: Config, table: str) -> dict[str, str]:
+    """The unit of every kind of number in the bundle; `table` names what the tables hold."""
+    absolute = config.material.normalisation == "absolute"
+    return {
+        table: "1/sr" if absolute else "1",
+        "XYZ": "1/sr, for it is a BRDF times cos(theta_i)" if absolute else "RU",
+        "u, v, w": "1",
+        "lengths": "um",
+        "wavelengths": "nm",
+        "angles": "degrees in files, radians in formulas",
+    }
+
+
+def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
+    """Light and observer."""
+    return Colour(
+        observer=config.spectrum.observer,
+        illuminant=_illuminant(config),
+        range_nm=list(config.spectrum.range_nm),
+        step_nm=config.table.step_nm if isinstance(config.table, TaylorLayout) else None,
+        wavelengths=inputs["table"].summary["wavelengths"],
+    )
+
+
+def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
+    """What the scan's band and the scene leave out."""
+    table, band = inputs["table"].summary, inputs["surface"].summary["statistics"]["band_limit_per_um"]
+    known = 1e-3 * shortest_wavelength_nm(config.spectrum) * min(band)
+    return Coverage(
+        unknown_share=table["unknown_share"],
+        skipped_share=table["skipped_share"],
+        known_radius=min(grid.U_MAX, known),
+        band_limit_per_um=list(band),
+    )
+
+
+def made_by(inputs: Mapping[str, Artifact]) -> MadeBy:
+    """The tool, libraries and device that made the table, as recorded with it: never this machine's own."""
+    recorded = inputs["table"].record.get("provenance", {})
+    return MadeBy(
+        diffract_bake=str(recorded.get("diffract-bake", _NOT_RECORDED)),
+        stages={name: int(artifact.record.get("version", 0)) for name, artifact in inputs.items()},
+        libraries={name: str(recorded.get(name, _NOT_RECORDED)) for name in _LIBRARIES},
+        device=str(recorded.get("device", _NOT_RECORDED)),
+        driver=str(recorded.get("driver", _NOT_RECORDED)),
+    )
+
+
+def provenance(config: Config, keys: Mapping[str, str]) -> Provenance:
+    """Where the bundle comes from; `keys` are the artifacts' addresses by stage."""
+    return Provenance(config=_resolved(config), artifacts=dict(keys))
+
+
+def _resolved(config: Config) -> dict[str, Any]:
+    """The whole config, files by name and content, without folders of this machine."""
+    resolved = config.model_dump(mode="json")
+    resolved["surface"]["path"] = None if config.surface.path is None else _named_file(config.surface.path)
+    resolved["spectrum"]["illuminant"] = _illuminant(config)
+    resolved["material"]["metal"] = _file_or_name(config.material.metal)
+    return resolved
+
+
+def _illuminant(config: Config) -> dict[str, Any]:
+    illuminant = config.spectrum.illuminant
+    return _file_or_name(illuminant) if isinstance(illuminant, str) else illuminant.model_dump()
+
+
+def _file_or_name(name: str) -> dict[str, Any]:
+    return _named_file(name) if name.lower().endswith(".csv") else {"name": name}
+
+
+def _named_file(path: str) -> dict[str, Any]:
+    return {"file": Path(path).name, "sha256": of_file(Path(path))}

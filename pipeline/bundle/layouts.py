@@ -1,0 +1,14 @@
+"""Which module knows what a bundle says of a table."""
+
+from collections.abc import Mapping
+
+from pipeline.bundle import polar, taylor
+from pipeline.bundle.prepared import Prepared
+from pipeline.config import Config, PolarLayout
+from pipeline.store import Artifact
+
+
+def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
+    """A table's part of a bundle. Raises AccuracyError where what is to be stored would not keep its digits."""
+    layout = polar.prepare if isinstance(config.table, PolarLayout) else taylor.prepare
+    return layout(config, inputs)

@@ -1,0 +1,88 @@
+"""Polar tables in a bundle: images of spline coefficients, four outputs in each."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from pipeline.bundle import exr, polar_readme, polar_storage
+from pipeline.bundle.manifest import CertificateEntry, PolarGrid, PolarImage
+from pipeline.bundle.polar_storage import Stored
+from pipeline.bundle.prepared import Prepared, Texture
+from pipeline.config import Config
+from pipeline.stages import polar_table, surface
+from pipeline.store import Artifact
+from pipeline.tables.compression import CHANNELS, Textures
+
+_CONVENTION = (
+    "value(u, v, |w|) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the factors of the "
+    "material that vary with wavelength inside the sum; 'grid' says how it is stored"
+)
+_EVALUATION = (
+    "XYZ = C cos(theta_i) value(u, v, |w|); value = g(rho) sum_k T_k(x) sum_o output_o(u, v) basis[o][channel][k], "
+    "output_o looked up by cubic B-splines; see 'grid'"
+)
+_WINDOW = (
+    "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch; where plan.windows > 1, |P|^2 is its mean over "
+    "so many windows beside each other"
+)
+_PLANNED = ("terms", "s_nodes", "w_terms", "probed_delta_e", "windows", "speckle_contrast")
+
+
+def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
+    """A polar table's part of a bundle. Raises AccuracyError where what is stored misses a budget."""
+    table = polar_table.load(inputs["table"])
+    stored, loss = polar_storage.choose(config, table, surface.load(inputs["surface"]))
+    entry = grid_entry(stored.textures)
+    return Prepared(
+        holds="value",
+        conventions={"value": _CONVENTION, "window": _WINDOW},
+        evaluation=_EVALUATION,
+        grid=entry,
+        images=_images(config, stored),
+        count=stored.textures.count,
+        plan={key: inputs["spectrum"].summary.get(key) for key in _PLANNED},
+        certificate=CertificateEntry.model_validate(inputs["table"].summary["certificate"]),
+        loss=loss,
+        files=polar_readme.files(entry, stored.textures.count, config.publish.precision),
+        shader=polar_readme.shader(entry, stored.textures.count),
+    )
+
+
+def grid_entry(textures: Textures) -> PolarGrid:
+    """Where the texels of textures stand and what is made of them."""
+    rings, azimuths = textures.grid.rings, textures.grid.azimuths
+    outputs, _, terms = textures.basis.shape
+    return PolarGrid(
+        layout="polar",
+        width=azimuths.count,
+        height=rings.count,
+        r0=rings.r0,
+        step=rings.step,
+        rho_max=rings.rho_max,
+        stretch=azimuths.stretch,
+        axis_rad=azimuths.axis_rad,
+        w_terms=terms,
+        envelope_radius=textures.envelope.radius,
+        envelope_exponent=textures.envelope.exponent,
+        basis=None if outputs == 3 * terms else textures.basis.tolist(),
+    )
+
+
+def _images(config: Config, stored: Stored) -> Iterator[Texture]:
+    """tables/T_00.exr ... and their pixels."""
+    in_half = config.publish.precision == "half"
+    for q in range(stored.textures.count):
+        outputs = slice(CHANNELS * q, CHANNELS * (q + 1))
+        pixels = np.moveaxis(stored.values[:, outputs], 1, -1)
+        image = PolarImage(
+            layout="polar",
+            file=f"tables/T_{q:02d}.exr",
+            width=pixels.shape[1],
+            height=pixels.shape[0],
+            channels=sorted(exr.CHANNELS),
+            pixel_type=config.publish.precision,
+            index=q,
+            scale=stored.scale[outputs].tolist(),
+            half_subnormal_share=float(np.mean(stored.subnormal[:, outputs])) if in_half else None,
+        )
+        yield image, pixels

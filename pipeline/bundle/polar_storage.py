@@ -1,0 +1,145 @@
+"""How a polar table is stored: in how many textures, at what precision, and what that costs on random directions."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.bundle import half
+from pipeline.bundle.manifest import ColourErrors, PolarLoss
+from pipeline.config import Config
+from pipeline.directions import random_pairs
+from pipeline.errors import AccuracyError
+from pipeline.evaluate import relative_unit, table_evaluator
+from pipeline.optics import geometry
+from pipeline.optics.colour_error import delta_e
+from pipeline.optics.geometry import Array
+from pipeline.reference import reference_of
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.compression import Textures, compress, flattened, most_textures, whole
+from pipeline.tables.polar import PolarTable
+from pipeline.validation import RANDOM_DIRECTIONS
+
+_SEED = 20160816
+_MIRROR_EXPOSURE_RU = 1.0
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Textures as they stand in files.
+
+    values: float32 or float16 (rings, outputs, azimuths), over `scale` (outputs,). textures: what is read back.
+    """
+
+    values: NDArray[np.floating[Any]]
+    scale: Array
+    textures: Textures
+
+    @property
+    def subnormal(self) -> NDArray[np.bool_]:
+        """Which values half keeps with fewer than 11 bits."""
+        return half.subnormal(self.values)
+
+
+def store(textures: Textures, precision: str) -> Stored:
+    """Textures at a precision: float as they are; half over an envelope and a scale for each output."""
+    if precision == "float":
+        return Stored(textures.values, np.ones(textures.values.shape[1]), textures)
+    flat = flattened(textures)
+    scale = half.scales(np.max(np.abs(flat.values), axis=(0, 2)).astype(np.float64))
+    factor = scale.astype(np.float32)[:, None]
+    values = (flat.values / factor).astype(np.float16)
+    return Stored(values, scale, replace(flat, values=values.astype(np.float32) * factor))
+
+
+def choose(config: Config, table: PolarTable, field: HeightField) -> tuple[Stored, PolarLoss | None]:
+    """What [publish] asks for, and what it costs: None where nothing is lost.
+
+    "auto" in half floats takes the fewest textures whose error is within the budget, all where none is. Raises
+    AccuracyError where the error exceeds a budget that the config sets.
+    """
+    asked, precision = config.publish.textures, config.publish.precision
+    if precision == "float" and asked in ("auto", "full"):
+        return store(whole(table), precision), None
+    measure = _Measure(config, table, field)
+    for count in _candidates(asked, most_textures(table)):
+        stored = store(_textures(table, count, config), precision)
+        loss = measure(stored)
+        if loss.error.mean <= config.budget_delta_e:
+            break
+    _refuse_missed_budget(config, loss)
+    return stored, loss
+
+
+def _candidates(asked: str | int, most: int) -> Iterable[int]:
+    """Numbers of textures to try, in order."""
+    if asked == "auto":
+        return range(1, most + 1)
+    return [most] if isinstance(asked, str) else [min(asked, most)]
+
+
+def _textures(table: PolarTable, count: int, config: Config) -> Textures:
+    return whole(table) if count == most_textures(table) else compress(table, count, config.scene)
+
+
+class _Measure:
+    """Holds what is stored against the exact sum and against the table before, on random directions."""
+
+    def __init__(self, config: Config, table: PolarTable, field: HeightField) -> None:
+        self._config, self._most, self._unit = config, most_textures(table), relative_unit(config)
+        self._wi, self._wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
+        reference = reference_of(field, config)
+        self._truth = reference.xyz(config.spectrum, config.material, self._wi, self._wr)
+        evaluate = table_evaluator(table, config)
+        self._mirrored = self._wi * [-1.0, -1.0, 1.0]
+        self._before, self._mirror = (evaluate(self._wi, views) for views in (self._wr, self._mirrored))
+
+    def __call__(self, stored: Stored) -> PolarLoss:
+        # every disc of rings holds the mirror directions, whatever its scene
+        after, mirror = (self._evaluate(stored.textures, views) for views in (self._wr, self._mirrored))
+        exposure = self._config.accuracy.exposure_ru
+        in_half = self._config.publish.precision == "half"
+        return PolarLoss(
+            layout="polar",
+            directions=len(self._wi),
+            textures=stored.textures.count,
+            most_textures=self._most,
+            error=self._errors(after, self._truth, exposure),
+            added=self._errors(after, self._before, exposure),
+            added_in_mirror=self._errors(mirror, self._mirror, _MIRROR_EXPOSURE_RU),
+            subnormal_share=float(np.mean(stored.subnormal)) if in_half else None,
+        )
+
+    def _evaluate(self, textures: Textures, views: Array) -> Array:
+        uv = geometry.uvw(self._wi, views)[:, :2]
+        g = textures.envelope.at(np.hypot(uv[:, 0], uv[:, 1]))
+        return g[:, None] * table_evaluator(textures.table(), self._config)(self._wi, views)
+
+    def _errors(self, found: Array, truth: Array, exposure_ru: float) -> ColourErrors:
+        error = delta_e(found / self._unit, truth / self._unit, exposure_ru)
+        return ColourErrors(
+            exposure_ru=exposure_ru,
+            mean=float(error.mean()),
+            percentile_99=float(np.percentile(error, 99)),
+            maximum=float(error.max()),
+        )
+
+
+def _refuse_missed_budget(config: Config, loss: PolarLoss) -> None:
+    budget = config.accuracy.delta_e
+    if budget is None or loss.error.mean <= budget:
+        return
+    if loss.textures < loss.most_textures:
+        remedy = f"publish.textures above {loss.textures}, of {loss.most_textures}"
+    elif config.publish.precision == "half":
+        remedy = 'publish.precision = "float"'
+    else:
+        remedy = "a larger accuracy.delta_e"
+    raise AccuracyError(
+        f'{loss.textures} textures of publish.precision = "{config.publish.precision}" miss the budget: on '
+        f"{loss.directions} random directions the mean CIELAB error at {loss.error.exposure_ru:g} RU is "
+        f"{loss.error.mean:.3g} ({loss.added.mean:.3g} from the table as baked), and accuracy.delta_e allows "
+        f"{budget:g}. Set {remedy}"
+    )

@@ -1,0 +1,73 @@
+"""The paper's tables in a bundle: one image for each I_p."""
+
+from collections.abc import Iterator, Mapping
+
+from pipeline.bundle import exr, taylor_half, taylor_readme
+from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
+from pipeline.bundle.prepared import Prepared, Texture
+from pipeline.config import Config
+from pipeline.errors import ConfigError
+from pipeline.optics.geometry import Array
+from pipeline.stages import taylor_table
+from pipeline.store import Artifact
+from pipeline.tables import grid
+from pipeline.tables.taylor import TaylorTable
+
+_CONVENTION = (
+    "sum_p w^p I_p(u, v) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the "
+    "factors of the material that vary with wavelength inside the sum"
+)
+_EVALUATION = (
+    "XYZ = C cos(theta_i) sum_p w^p I_p(u, v); I_p = scale_p * (R, G, B) where A = 1; "
+    "by Horner's rule from the highest p down"
+)
+_PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
+
+
+def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
+    """A Taylor table's part of a bundle.
+
+    Raises AccuracyError where half precision would lose the digits, ConfigError where textures are asked for.
+    """
+    if config.publish.textures not in ("auto", "full"):
+        fault = f"{config.publish.textures} textures hold a polar table only; leave it out for layout 'taylor'"
+        raise ConfigError(config.name, [("publish.textures", fault)])
+    table = taylor_table.load(inputs["table"])
+    scale = taylor_half.scales(table, config.publish.precision)
+    # measured first: it may refuse
+    loss = taylor_half.measure(config, table, scale) if config.publish.precision == "half" else None
+    entry = TaylorGrid(
+        layout="taylor", width=table.resolution, height=table.resolution, power=table.power, u_max=grid.U_MAX
+    )
+    return Prepared(
+        holds="I_p",
+        conventions={"I_p": _CONVENTION},
+        evaluation=_EVALUATION,
+        grid=entry,
+        images=_images(config, table, scale, loss),
+        count=len(scale),
+        plan={key: inputs["stack"].summary.get(key) for key in _PREDICTED},
+        certificate=None,
+        loss=loss,
+        files=taylor_readme.files(entry, len(scale), config.publish.precision),
+        shader=taylor_readme.shader(entry, len(scale)),
+    )
+
+
+def _images(config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss | None) -> Iterator[Texture]:
+    """tables/I_00.exr ... and their pixels."""
+    stored = config.publish.precision
+    lost = None if loss is None else taylor_half.subnormal_shares(table, scale)
+    for p, plane in enumerate(taylor_half.planes(table, scale, stored)):
+        image = TaylorImage(
+            layout="taylor",
+            file=f"tables/I_{p:02d}.exr",
+            width=plane.shape[1],
+            height=plane.shape[0],
+            channels=sorted(exr.CHANNELS),
+            pixel_type=stored,
+            index=p,
+            scale=float(scale[p]),
+            half_subnormal_share=None if lost is None else float(lost[p]),
+        )
+        yield image, plane

@@ -1,0 +1,193 @@
+"""Polar tables in a bundle: what the manifest says of them, few textures, half floats, and when they are refused."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from pipeline.bundle import polar_storage
+from pipeline.bundle.manifest import CertificateEntry, ColourErrors, Manifest, PolarGrid, PolarLoss
+from pipeline.bundle.open import bundle_evaluator
+from pipeline.bundle.publish import publish, published
+from pipeline.bundle.verify import verify
+from pipeline.directions import random_pairs
+from pipeline.errors import AccuracyError, ConfigError
+from pipeline.evaluate import table_evaluator
+from pipeline.optics.colour_error import delta_e
+from pipeline.stages import polar_table
+from pipeline.validation import RANDOM_DIRECTIONS
+
+from .conftest import SCENE, Baker, small
+from .test_publish import manifest_of
+
+# between what the table itself keeps and what one texture of it keeps
+BUDGET = 4.0
+
+
+@pytest.fixture(scope="module")
+def bundle(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return publish(small("polar"), bake(small("polar")), tmp_path_factory.mktemp("out"))
+
+
+def published_with(bake: Baker, out: Path, **keys: Any) -> tuple[Path, Manifest]:
+    config = small("polar", publish=keys)
+    folder = publish(config, bake(config), out)
+    return folder, manifest_of(folder)
+
+
+def grid_of(told: Manifest) -> PolarGrid:
+    assert isinstance(told.grid, PolarGrid)
+    return told.grid
+
+
+def loss_of(told: Manifest) -> PolarLoss:
+    assert isinstance(told.storage_loss, PolarLoss)
+    return told.storage_loss
+
+
+def test_texels_are_the_tables_coefficients(bake: Baker, bundle: Path) -> None:
+    table, told = polar_table.load(bake(small("polar"))["table"]), manifest_of(bundle)
+    assert [entry.file for entry in told.tables] == [f"tables/T_{q:02d}.exr" for q in range(9)]
+    assert grid_of(told).basis is None
+    assert told.storage_loss is None
+    outputs = table.values.reshape(table.grid.rings.count, -1, table.grid.azimuths.count)
+    for entry in told.tables:
+        with OpenEXR.File(str(bundle / entry.file), separate_channels=True) as file:
+            pixels = [file.channels()[name].pixels for name in "RGBA"]
+        for c, plane in enumerate(pixels):
+            np.testing.assert_array_equal(plane, outputs[:, 4 * entry.index + c])
+
+
+def test_the_mapping_told_is_the_grids(bake: Baker, bundle: Path) -> None:
+    table, told = polar_table.load(bake(small("polar"))["table"]), grid_of(manifest_of(bundle))
+    assert (told.height, told.width) == (40, 192)
+    rho = told.r0 * np.sinh(np.arange(told.height) * told.step)
+    np.testing.assert_allclose(rho, table.grid.rings.rho(), rtol=1e-12)
+    phi = table.grid.azimuths.angles()
+    u, v = np.cos(phi), np.sin(phi)
+    cos, sin = np.cos(told.axis_rad), np.sin(told.axis_rad)
+    turns = np.arctan2(cos * v - sin * u, told.stretch * (cos * u + sin * v)) / (2.0 * np.pi)
+    column = turns % 1.0 * told.width
+    off = (column - np.arange(told.width) + 0.5 * told.width) % told.width - 0.5 * told.width
+    np.testing.assert_allclose(off, 0.0, atol=1e-9)
+
+
+def test_the_manifest_tells_certificate_plan_and_stages(bake: Baker, bundle: Path) -> None:
+    inputs, told = bake(small("polar")), manifest_of(bundle)
+    assert told.certificate == CertificateEntry.model_validate(inputs["table"].summary["certificate"])
+    assert (told.plan["w_terms"], told.plan["windows"]) == (12, inputs["spectrum"].summary["windows"])
+    assert list(told.provenance.artifacts) == ["surface", "spectrum", "table", "render", "validate"]
+    assert told.made_by.stages.keys() == told.provenance.artifacts.keys()
+    assert told.colour.step_nm is None
+    assert told.colour.wavelengths == inputs["table"].summary["wavelengths"]
+    assert told.coverage.unknown_share == inputs["table"].summary["unknown_share"]
+
+
+def test_the_readme_shows_the_certificate_and_its_own_numbers(bundle: Path) -> None:
+    text, told = (bundle / "README.md").read_text(encoding="utf-8"), manifest_of(bundle)
+    assert told.certificate is not None
+    assert f"keeps {told.certificate.measured:.3g}" in text
+    assert "const int RINGS = 40, AZIMUTHS = 192, TEXTURES = 9, TERMS = 12;" in text
+    assert f"R0 = {grid_of(told).r0!r}, STEP = {grid_of(told).step!r}" in text
+
+
+def test_a_standing_bundle_is_found_again(bake: Baker, bundle: Path) -> None:
+    config = small("polar")
+    keys = {name: artifact.key for name, artifact in bake(config).items()}
+    assert published(config, keys, bundle.parent) == bundle
+    assert published(config, {**keys, "table": "another"}, bundle.parent) is None
+    assert published(small("polar", publish={"textures": 2}), keys, bundle.parent) is None
+
+
+@pytest.mark.parametrize(
+    ("keys", "textures", "kind"),
+    [
+        ({"textures": 3}, 3, np.float32),
+        ({"textures": 3, "precision": "half"}, 3, np.float16),
+        ({"textures": "full", "precision": "half"}, 9, np.float16),
+        ({"textures": 100, "precision": "half"}, 9, np.float16),
+    ],
+)
+def test_a_bundle_errs_as_it_says(
+    bake: Baker, tmp_path: Path, keys: dict[str, Any], textures: int, kind: type
+) -> None:
+    folder, told = published_with(bake, tmp_path, **keys)
+    assert verify(folder) == []
+    assert len(told.tables) == textures == loss_of(told).textures
+    with OpenEXR.File(str(folder / told.tables[-1].file), separate_channels=True) as file:
+        assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
+    wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
+    table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar"))
+    evaluate = bundle_evaluator(folder)
+    mirror = wi * [-1.0, -1.0, 1.0]
+    for views, error in ((wr, loss_of(told).added), (mirror, loss_of(told).added_in_mirror)):
+        found = delta_e(evaluate(wi, views), table(wi, views), error.exposure_ru)
+        assert found.mean() == pytest.approx(error.mean, rel=1e-2, abs=1e-4)
+    assert f"in {textures} of 9 textures" in (folder / "README.md").read_text(encoding="utf-8")
+
+
+def test_more_textures_err_less(bake: Baker, tmp_path: Path) -> None:
+    errors = [loss_of(published_with(bake, tmp_path, textures=n)[1]).added.mean for n in (1, 3, 6, 9)]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1e-9 < errors[-2] < 0.2 * errors[0]
+
+
+def test_half_is_told_what_falls_below_its_digits(bake: Baker, tmp_path: Path) -> None:
+    folder, told = published_with(bake, tmp_path, textures=2, precision="half")
+    shares = []
+    for entry in told.tables:
+        with OpenEXR.File(str(folder / entry.file), separate_channels=True) as file:
+            pixels = np.abs(np.stack([channel.pixels for channel in file.channels().values()]).astype(np.float32))
+        assert 2.0**14 <= pixels.max() <= 2.0**15
+        shares.append(np.mean((pixels > 0.0) & (pixels < 2.0**-14)))
+        assert entry.half_subnormal_share == pytest.approx(shares[-1])
+    assert loss_of(told).subnormal_share == pytest.approx(np.mean(shares))
+
+
+def budgeted(**publish: Any) -> Any:
+    return small("polar", accuracy={"delta_e": BUDGET}, publish={"precision": "half", **publish})
+
+
+def test_auto_takes_the_fewest_textures_of_the_budget(bake: Baker, tmp_path: Path) -> None:
+    loss = loss_of(manifest_of(publish(budgeted(), bake(budgeted()), tmp_path)))
+    assert loss.error.mean <= BUDGET
+    assert 1 < loss.textures < 9
+    fewer = budgeted(textures=loss.textures - 1)
+    with pytest.raises(AccuracyError, match=rf"Set publish\.textures above {loss.textures - 1}, of 9$"):
+        publish(fewer, bake(fewer), tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_auto_takes_all_where_no_number_keeps_the_budget(
+    bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried = []
+    measure = polar_storage._Measure.__call__
+
+    def hopeless(self: polar_storage._Measure, stored: polar_storage.Stored) -> PolarLoss:
+        tried.append(stored.textures.count)
+        found = measure(self, stored)
+        return found.model_copy(
+            update={"error": ColourErrors(exposure_ru=7500.0, mean=200.0, percentile_99=0.0, maximum=0.0)}
+        )
+
+    monkeypatch.setattr(polar_storage._Measure, "__call__", hopeless)
+    with pytest.raises(AccuracyError, match=r'9 textures .* Set publish\.precision = "float"$'):
+        publish(budgeted(), bake(budgeted()), tmp_path)
+    assert tried == list(range(1, 10))
+
+
+@pytest.mark.parametrize("textures", [0, -1, 2.5, "some"])
+def test_textures_are_a_number_of_them(textures: object) -> None:
+    with pytest.raises(ConfigError, match=r"publish\.textures"):
+        small("polar", publish={"textures": textures})
+
+
+def test_a_scenes_bundle_knows_its_part(bake: Baker, tmp_path: Path) -> None:
+    config = small("polar", scene=SCENE, render={"lights": SCENE["lights"]}, publish={"textures": 3})
+    told = manifest_of(publish(config, bake(config), tmp_path))
+    assert told.coverage.skipped_share == pytest.approx(1.0 - (grid_of(told).rho_max / 2.0) ** 2)
+    assert told.coverage.skipped_share > 0.3
+    assert loss_of(told).error.mean < 10.0
