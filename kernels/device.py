@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import platformdirs
@@ -24,6 +24,9 @@ REMEDY = (
     "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
     "`conda install -c conda-forge pocl`; then `diffract-bake doctor` shows what was found"
 )
+
+# of each of three arrays: more than last caches hold
+_TRIAD_BYTES = 2**27
 
 _PROBE = "__kernel void probe(__global double *x) { x[get_global_id(0)] = 2.0 * get_global_id(0); }"
 
@@ -145,6 +148,28 @@ def _programs(sources: tuple[str, ...], constants: tuple[tuple[str, int], ...]) 
     return Program(sources, dict(constants))
 
 
+@dataclass(frozen=True)
+class Launch:
+    """One kernel that ran, and how long it took from its launch to its end."""
+
+    kernel: str
+    seconds: float
+
+
+_listening: list[list[Launch]] = []
+
+
+@contextmanager
+def timing() -> Iterator[list[Launch]]:
+    """Fills a list with every launch of this process while it lasts."""
+    launches: list[Launch] = []
+    _listening.append(launches)
+    try:
+        yield launches
+    finally:
+        _listening.pop()
+
+
 class Program:
     """OpenCL sources built with constants, their kernels ready to launch on the default device."""
 
@@ -168,8 +193,11 @@ class Program:
         self._enqueue(kernel, size, arguments)
 
     def _enqueue(self, kernel: str, size: tuple[int, ...], arguments: tuple[Any, ...]) -> None:
+        started = time.perf_counter()
         self._kernels[kernel](self.device.queue, size, (1,) * len(size), *arguments)
         self.device.queue.finish()
+        for launches in _listening:
+            launches.append(Launch(kernel, time.perf_counter() - started))
 
 
 def source(name: str) -> str:
@@ -212,15 +240,34 @@ def settle(buffer: Any, array: np.ndarray) -> np.ndarray:
     return array
 
 
-def measure_peak(seconds: float = 0.5) -> float:
-    """Double-precision operations a second of this device, by chains of fused multiply-adds."""
-    peak = program(("peak.cl",), {})
+def measure_peak(precision: Literal["single", "double"], seconds: float = 0.5) -> float:
+    """Operations a second of this device, by chains of fused multiply-adds on whole vectors of 64 bytes."""
+    lanes, size = {"single": (16, 4), "double": (8, 8)}[precision]
+    peak = program(("peak.cl",), {"LANES": lanes})
     items, steps = 64 * default_device().compute_units, 20_000
-    buffer = result_buffer(8 * items)
-    peak.launch("peak", (items,), np.int32(steps), buffer)
-    best, until = 0.0, time.perf_counter() + seconds
+    buffer = result_buffer(size * items)
+    return items * steps * 16.0 * lanes / _shortest(peak, "peak", (items,), (np.int32(steps), buffer), seconds)
+
+
+def measure_bandwidth(seconds: float = 0.5) -> float:
+    """Bytes a second between this device and its memory, by McCalpin's triad: two arrays read, one written."""
+    vectors, nbytes = 256, _TRIAD_BYTES
+    ones = np.ones(nbytes // 4, np.float32)
+    a, b, out = upload(ones), upload(ones), result_buffer(nbytes)
+    triad = program(("bandwidth.cl",), {"VECTORS": vectors})
+    items = nbytes // (64 * vectors)
+    return 3.0 * nbytes / _shortest(triad, "triad", (items,), (a, b, np.float32(3.0), out), seconds)
+
+
+def _shortest(
+    built: Program, kernel: str, size: tuple[int, ...], arguments: tuple[Any, ...], seconds: float
+) -> float:
+    """The shortest of all launches that fit into `seconds`, s."""
+    # the first compiles, and touches every page
+    built.launch(kernel, size, *arguments)
+    best, until = float("inf"), time.perf_counter() + seconds
     while time.perf_counter() < until:
-        started = time.perf_counter()
-        peak.launch("peak", (items,), np.int32(steps), buffer)
-        best = max(best, items * steps * 128.0 / (time.perf_counter() - started))
+        with timing() as launches:
+            built.launch(kernel, size, *arguments)
+        best = min(best, launches[0].seconds)
     return best

@@ -9,7 +9,7 @@ from kernels.diffraction import DeviceStack, fourth_column
 
 LANES = 16  # azimuths of a tile: floats in one vector
 _MOST_OUTPUTS = 28  # sums that stay in the 32 vector registers beside what they read
-_ORDER = 8  # nodes of the interpolation over r
+ORDER = 8  # nodes of the interpolation over r
 
 
 def polar_spectrum(
@@ -81,7 +81,7 @@ def integrate(
     program = device.program(
         ("spectral_operator.cl",),
         {
-            "ORDER": _ORDER,
+            "ORDER": ORDER,
             "S_NODES": nodes,
             "W_TERMS": w_terms,
             "OUT": outputs,
@@ -89,10 +89,10 @@ def integrate(
             "GROUP": group,
         },
     )
-    extent = _extents(radius_per_um, rho, quadratures, nodes)
+    extent = extents(radius_per_um, rho, quadratures, nodes)
     values_to_terms, _ = _chebyshev(nodes)
     w_values_to_terms, _ = _chebyshev(w_terms)
-    radius, rings, wavelengths, weights, spans, extents, reflected, cardinal, cosine, w_node = (
+    radius, rings, wavelengths, weights, spans, places, reflected, cardinal, cosine, w_node = (
         device.upload(a)
         for a in (
             radius_per_um,
@@ -117,7 +117,7 @@ def integrate(
         wavelengths,
         weights,
         spans,
-        extents,
+        places,
         reflected,
         np.float32(s_max_per_um),
         cardinal,
@@ -127,21 +127,21 @@ def integrate(
     )
     out = np.empty((len(rho), outputs, LANES * tiles), np.float32)
     power, result = device.shared(spectrum), device.shared(out)
-    program.launch("apply_operator", (len(rho), tiles, groups), power, np.int32(radii), extents, matrix, result)
+    program.launch("apply_operator", (len(rho), tiles, groups), power, np.int32(radii), places, matrix, result)
     return device.settle(result, out)
 
 
-def _extents(radius_per_um: np.ndarray, rho: np.ndarray, quadratures: RingQuadratures, nodes: int) -> np.ndarray:
+def extents(radius_per_um: np.ndarray, rho: np.ndarray, quadratures: RingQuadratures, nodes: int) -> np.ndarray:
     """int32 (rings, 4): the first radius of a ring's matrix, how many, where it begins, and its reflectances."""
     shortest = quadratures.lambda_um[quadratures.first]
     longest = quadratures.lambda_um[quadratures.first + quadratures.count - 1]
 
     def first_node(r: np.ndarray) -> np.ndarray:
         below = np.clip(np.searchsorted(radius_per_um, r, side="right") - 1, 0, len(radius_per_um) - 2)
-        return np.minimum(below - (_ORDER // 2 - 1), len(radius_per_um) - _ORDER)
+        return np.minimum(below - (ORDER // 2 - 1), len(radius_per_um) - ORDER)
 
     low, high = first_node(rho / longest), first_node(rho / shortest)
-    count = high - low + _ORDER
+    count = high - low + ORDER
     begin = np.concatenate([[0], np.cumsum(count * nodes)[:-1]])
     rows = np.concatenate([[0], np.cumsum(quadratures.count)[:-1]])
     return np.stack([low, count, begin, rows], axis=-1).astype(np.int32)

@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from pipeline.config import Config, Recipe
+from pipeline.config import Config, Recipe, TaylorLayout
 from pipeline.errors import ConfigError
 
 _LAYOUTS = ("polar", "taylor")
@@ -38,7 +38,7 @@ def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
         config = Config.model_validate(document, context={"folder": folder})
     except ValidationError as error:
         raise ConfigError(source, _merged([_fault(e) for e in error.errors()])) from None
-    faults = _scene_faults(config) + _repeated_lights(config)
+    faults = _scene_faults(config) + _repeated_lights(config) + _texture_faults(config)
     if faults:
         raise ConfigError(source, faults)
     return config
@@ -67,6 +67,15 @@ def _repeated_lights(config: Config) -> list[tuple[str, str]]:
         for j in range(i)
         if lights[i].same_as(lights[j])
     ]
+
+
+def _texture_faults(config: Config) -> list[tuple[str, str]]:
+    """The paper's table is an image for every power of w; only a polar one is stored at a chosen rank."""
+    if isinstance(config.table, TaylorLayout) and config.publish.textures not in ("auto", "full"):
+        return [
+            ("publish.textures", f"{config.publish.textures} textures hold a polar table only; leave it out here")
+        ]
+    return []
 
 
 def _merged(faults: list[tuple[str, str]]) -> list[tuple[str, str]]:

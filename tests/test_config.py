@@ -222,6 +222,7 @@ def test_every_fault_is_reported_at_once(tmp_path):
         (with_section("table", layout="taylor", resolution=500), "table.resolution", "odd"),
         (with_section("table", terms=0), "table.terms", "greater than or equal to 2"),
         (with_section("render", lights=[]), "render.lights", "at least 1"),
+        ({**MINIMAL, "table": {"layout": "taylor"}, "publish": {"textures": 3}}, "publish.textures", "polar"),
         (with_section("scene"), "scene.lights", "required"),
         ({**MINIMAL, "name": "../a"}, "name", "pattern"),
         ({**MINIMAL, "name": "a\n"}, "name", "pattern"),

@@ -1,12 +1,22 @@
 /* The device's own peak: chains of fused multiply-adds that nothing but arithmetic bounds.
  *
- *   out  double[work-items]   keeps the compiler from removing the work
+ *   out  REAL[work-items]   keeps the compiler from removing the work
  *
- * Each step is 8 independent double8 FMAs, enough to hide their latency: 128 floating-point operations.
+ * Each step is 8 independent FMAs of whole vectors, enough to hide their latency: 16 LANES floating-point operations.
+ * Set by the host: LANES, 16 for float or 8 for double.
  */
-__kernel void peak(const int steps, __global double *out) {
-    const double8 scale = 0.999999, shift = 1e-6 * (double)get_global_id(0);
-    double8 a = 0.0, b = 1.0, c = 2.0, d = 3.0, e = 4.0, f = 5.0, g = 6.0, h = 7.0;
+#if LANES == 16
+typedef float REAL;
+typedef float16 VECTOR;
+#else
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+typedef double REAL;
+typedef double8 VECTOR;
+#endif
+
+__kernel void peak(const int steps, __global REAL *out) {
+    const VECTOR scale = (REAL)0.999, shift = (REAL)1e-3 * (REAL)get_global_id(0);
+    VECTOR a = 0, b = 1, c = 2, d = 3, e = 4, f = 5, g = 6, h = 7;
     for (int i = 0; i < steps; ++i) {
         a = fma(a, scale, shift);
         b = fma(b, scale, shift);
@@ -17,6 +27,9 @@ __kernel void peak(const int steps, __global double *out) {
         g = fma(g, scale, shift);
         h = fma(h, scale, shift);
     }
-    const double8 sum = ((a + b) + (c + d)) + ((e + f) + (g + h));
-    out[get_global_id(0)] = sum.s0 + sum.s1 + sum.s2 + sum.s3 + sum.s4 + sum.s5 + sum.s6 + sum.s7;
+    const VECTOR sum = ((a + b) + (c + d)) + ((e + f) + (g + h));
+    const REAL *lane = (const REAL *)&sum;
+    REAL total = 0;
+    for (int i = 0; i < LANES; ++i) total += lane[i];
+    out[get_global_id(0)] = total;
 }

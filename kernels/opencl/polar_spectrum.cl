@@ -53,7 +53,8 @@ static void gather(__global const float *corner, const int columns, const float 
                    float *re, float *im) {
     for (int b = 0; b < BLOCKS; ++b) {
         float16 sum_re[4] = {0.0f, 0.0f, 0.0f, 0.0f}, sum_im[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-        UNROLL for (int t = 0; t < TAPS_Y; ++t) {
+        /* written out as well, a wide window's taps would take the compiler minutes */
+        _Pragma("nounroll") for (int t = 0; t < TAPS_Y; ++t) {
             __global const float *cell = corner + (long)t * columns * CELL + 16 * b;
             const float row = along_y[16 * t];
             UNROLL for (int s = 0; s < TAPS_X; ++s) {

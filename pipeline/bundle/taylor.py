@@ -6,7 +6,6 @@ from pipeline.bundle import exr, taylor_half, taylor_readme
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config import Config
-from pipeline.errors import ConfigError
 from pipeline.optics.geometry import Array
 from pipeline.stages import taylor_table
 from pipeline.store import Artifact
@@ -27,11 +26,8 @@ _PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
 def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
     """A Taylor table's part of a bundle.
 
-    Raises AccuracyError where half precision would lose the digits, ConfigError where textures are asked for.
+    Raises AccuracyError where half precision would lose the digits.
     """
-    if config.publish.textures not in ("auto", "full"):
-        fault = f"{config.publish.textures} textures hold a polar table only; leave it out for layout 'taylor'"
-        raise ConfigError(config.name, [("publish.textures", fault)])
     table = taylor_table.load(inputs["table"])
     scale = taylor_half.scales(table, config.publish.precision)
     # measured first: it may refuse

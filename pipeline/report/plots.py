@@ -17,7 +17,7 @@ _DPI = 110
 _MOST_PIXELS = 512
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
     # no creation time or version inside: the same data gives the same picture
@@ -41,7 +41,7 @@ def height_map(field: HeightField) -> bytes:
     )
     axes.set(xlabel="x (µm)", ylabel="y (µm)", title="Height field")
     figure.colorbar(image, label="height (nm)")
-    return _png(figure)
+    return png(figure)
 
 
 def _axes_of_map(axes: Any, title: str) -> None:
@@ -64,7 +64,7 @@ def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str)
     )
     _axes_of_map(panels[2], f"CIELAB error, {error_ru:g} RU")
     figure.colorbar(shown, ax=panels[2], label="ΔE*ab (1976)")
-    return _png(figure)
+    return png(figure)
 
 
 def convergence(curves: Sequence[Curve], exposure_ru: float) -> bytes:
@@ -81,4 +81,4 @@ def convergence(curves: Sequence[Curve], exposure_ru: float) -> bytes:
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize=8)
     panels[0].set_ylabel(f"mean ΔE at {exposure_ru:g} RU")
-    return _png(figure)
+    return png(figure)

@@ -28,18 +28,20 @@ from pipeline.tables import polar, quadrature
 from pipeline.tables.polar_grid import RHO_MAX, TILE, Azimuths, Rings
 
 # shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
-_AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
+AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
 _NODES_SHARE = 0.005  # of E, by its nodes in s
 _W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|; of at most 0.1
 _QUADRATURE_SHARE = 3e-3  # of each integral, by its wavelengths
 _GRID_SHARE = 0.65  # of the budget, by rings and azimuths as the probes see it
 _MOST_BYTES = 3 * 2**30
 # a start for the search: the grid that keeps 0.1 on snake scans at sigma = 16.25 um
-_BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0265, 0.1
+_BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0253, 0.12
 _LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
 _LEAST_STRETCH = 0.3
+_CHANCE = 0.04  # the harmonic that speckle of no direction has
 _PROBE_RHOS, _PROBE_ANGLES, _ANGLE_BINS = 48, 64, 1024
-_ROUNDS = 4
+_ROUNDS = 6
+_GROWTH = 1.5
 _NEAR = 0.75  # of the target: near enough not to search on
 _SEED = 19991
 _MIDDLING_PER_UM = 1.0
@@ -100,7 +102,7 @@ def make(
     """
     lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
     z = series.largest_phase(max(field.half_range_um for field in fields), lambda_min)
-    amplitude = _AMPLITUDE_SHARE * budget.delta_e
+    amplitude = AMPLITUDE_SHARE * budget.delta_e
     wanted = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
     # whole vectors of terms cost the same and are shared with the device without a copy
     terms = device.LANES * ceil(wanted / device.LANES)
@@ -164,7 +166,7 @@ class _Search:
         window = self._stack.sigma_um / _BASE_SIGMA_UM
         x = asinh(self._rho_max / self._r0)
         step = 0.5 * x / (self._radius[-1] * 2.0 * np.pi * self._stack.sigma_um) if self._line else _BASE_RING_STEP
-        rings = int(np.clip(x / step * finer, _LEAST_RINGS, _MOST_RINGS))
+        rings = int(np.clip(x / step * finer, self._least_rings, _MOST_RINGS))
         azimuths = int(np.clip(_BASE_AZIMUTHS * window * finer, _LEAST_AZIMUTHS, _MOST_AZIMUTHS))
         layout = self._layout
         return (
@@ -178,6 +180,12 @@ class _Search:
         widest = 4.0 * self._rho_max
         return widest if self._line else min(_BASE_R0 * _BASE_SIGMA_UM / self._stack.sigma_um, widest)
 
+    @property
+    def _least_rings(self) -> int:
+        """So many that the specular lobe is seen, which random probes hardly meet: its own width apart there."""
+        lobe = 1e-3 * self._lambda_min * sigma_f(self._stack.sigma_um)
+        return max(_LEAST_RINGS, ceil(self._r0 * asinh(self._rho_max / self._r0) / lobe))
+
     def _rings(self, count: int) -> Rings:
         return Rings(count, self._r0, self._rho_max)
 
@@ -190,7 +198,7 @@ class _Search:
                     f"{need / 2**30:.1f} GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller "
                     "coherence.sigma_um, lower the heights or raise accuracy.delta_e."
                 )
-        self._cache = {azimuths: self._gather(Azimuths(azimuths, self._stretch, self._axis))}
+            self._cache = {azimuths: self._gather(Azimuths(azimuths, self._stretch, self._axis))}
         return self._cache[azimuths]
 
     def _gather(self, azimuths: Azimuths) -> spectrum.PolarSpectrum:
@@ -214,19 +222,25 @@ class _Search:
         by_azimuths = _share(error(rings, other_azimuths) ** 2 - here, other_azimuths, azimuths)
         rest = max(here - by_rings * rings**-4.0 - by_azimuths * azimuths**-4.0, 0.0)
         left = max(target**2 - rest, 0.25 * target**2)
+        best = rings, azimuths
         for _ in range(_ROUNDS):
-            best = self._clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25)
+            before, best = best, self._clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25)
+            if errors.get(best, 0.0) > target:
+                # the model has nothing more to ask for, and errs: a coarse grid may be better by luck
+                best = self._clipped(_GROWTH * before[0], _GROWTH * before[1])
             if _NEAR * target <= error(*best) <= target:
                 break
             left *= min(4.0, (0.9 * target / error(*best)) ** 2)
-        met = [pair for pair in errors if errors[pair] <= target]
-        best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(errors, key=errors.__getitem__)
-        return *best, errors[best]
+        # what a config sets was varied to measure, not to choose
+        allowed = {pair: errors[pair] for pair in errors if pair == self._clipped(*pair)}
+        met = [pair for pair in allowed if allowed[pair] <= target]
+        best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(allowed, key=allowed.__getitem__)
+        return *best, allowed[best]
 
     def _clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
         layout = self._layout
         return (
-            int(np.clip(ceil(rings), _LEAST_RINGS, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
+            int(np.clip(ceil(rings), self._least_rings, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
             _whole_tiles(int(np.clip(azimuths, _LEAST_AZIMUTHS, _MOST_AZIMUTHS)))
             if layout.azimuths == "auto"
             else layout.azimuths,
@@ -301,7 +315,8 @@ def anisotropy(built: stack.Stack) -> tuple[float, float]:
     """
     phi, seen = _scattering(built)
     harmonic = np.sum(seen * np.exp(2j * phi)) / max(float(seen.sum()), np.finfo(float).tiny)
-    stretch = max(_LEAST_STRETCH, (1.0 - abs(harmonic)) / (1.0 + abs(harmonic)))
+    one_sided = max(0.0, abs(harmonic) - _CHANCE)
+    stretch = max(_LEAST_STRETCH, (1.0 - one_sided) / (1.0 + one_sided))
     return float(stretch), float(0.5 * np.angle(harmonic))
 
 

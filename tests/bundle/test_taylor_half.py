@@ -93,9 +93,3 @@ def test_a_scene_without_mirror_directions_is_measured(bake: Baker, tmp_path: Pa
     told = manifest_of(publish(config, bake(config), tmp_path)).storage_loss
     assert isinstance(told, TaylorLoss)
     assert set(told.relative_error_of_y) == {"random"}
-
-
-def test_textures_are_the_polar_layouts(bake: Baker, tmp_path: Path) -> None:
-    config = small(publish={"textures": 3})
-    with pytest.raises(ConfigError, match=r"publish\.textures: 3 textures hold a polar table only"):
-        publish(config, bake(config), tmp_path)

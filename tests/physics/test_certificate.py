@@ -71,6 +71,21 @@ def test_what_is_set_is_kept() -> None:
     assert table.values.shape == (20, 3, 4, 160)
 
 
+def test_one_axis_that_is_set_stays_while_the_other_is_searched() -> None:
+    _, chosen = planned(config(table={"rings": 36}, accuracy={"delta_e": 1.0}))
+    assert chosen.rings.count == 36
+    _, chosen = planned(config(table={"azimuths": 320}, accuracy={"delta_e": 1.0}))
+    assert chosen.azimuths.count == 320
+    assert chosen.probed_delta_e is not None
+
+
+def test_a_flat_mirror_is_planned_for_its_lobe() -> None:
+    recipe = {"kind": "mirror", "size_um": 6.4, "pitch_um": 0.1}
+    found = config(surface={"recipe": recipe}, coherence={"sigma_um": 1.6}, accuracy={"delta_e": 0.5})
+    table, _ = planned(found)
+    assert certificate.certify(table_evaluator(table, found), field_of(found), found).measured <= 0.5
+
+
 def test_a_table_that_misses_its_budget_gets_no_certificate() -> None:
     found = config(table={"rings": 12, "azimuths": 32})
     table, _ = planned(found)

@@ -1,0 +1,72 @@
+"""`bench`: what it prints and writes, on small surfaces."""
+
+import csv
+import json
+
+import pytest
+
+from cli.bench import _paths
+from cli.sources import load
+from tests.cli.tool import Result, Tool, recipe
+
+
+@pytest.fixture(scope="module")
+def benched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Tool, Result]:
+    folder = tmp_path_factory.mktemp("benched")
+    tool = Tool(folder, folder / "store")
+    result = tool("bench", tool.config(surface=recipe("gaussian")), "--quick", "--json", "--out", "figures")
+    assert result.code == 0, result.stderr
+    return tool, result
+
+
+def test_it_writes_what_it_measured(benched: tuple[Tool, Result]) -> None:
+    tool, result = benched
+    folder = tool.folder / "figures"
+    assert sorted(path.name for path in folder.iterdir()) == ["bench.csv", "bench.json", "bench.png"]
+    assert (folder / "bench.png").read_bytes().startswith(b"\x89PNG")
+    document = json.loads((folder / "bench.json").read_text(encoding="utf-8"))
+    assert document == {key: value for key, value in result.json.items() if key != "files"}
+    rows = list(csv.DictReader((folder / "bench.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == len(document["surfaces"][0]["points"])
+    assert all(float(row["seconds"]) > 0 and float(row["mean_delta_e"]) >= 0 for row in rows)
+
+
+def test_the_ways_agree(benched: tuple[Tool, Result]) -> None:
+    surface = benched[1].json["surfaces"][0]
+    assert surface["agreement"]["numpy"]["median"] < 1e-3
+    if surface["agreement"]["nufft"] is not None:
+        assert surface["agreement"]["nufft"]["median"] < 1e-3
+
+
+def test_every_criterion_has_a_verdict(benched: tuple[Tool, Result]) -> None:
+    criteria = benched[1].json["criteria"]
+    assert {c["number"] for c in criteria} == {"1", "2", "3", "4", "6"}
+    assert {c["verdict"] for c in criteria} <= {"pass", "MISS", "told", "not measured"}
+    assert all((c["measured"] is None) == (c["verdict"] == "not measured") for c in criteria)
+
+
+def test_shares_are_shares(benched: tuple[Tool, Result]) -> None:
+    timed = benched[1].json["surfaces"][0]["timed"]
+    assert {"stack", "spectrum", "apply_operator", "paper table"} <= {stage["stage"] for stage in timed}
+    assert all(0.0 < stage["bound_share"] < 1.5 for stage in timed)
+
+
+def test_a_tall_surface_has_no_paper_tables(tool: Tool) -> None:
+    """They would lose their digits: that is said, and everything else is measured."""
+    tall = recipe("gaussian", sigma_h_um=0.3)
+    result = tool("bench", tool.config(surface=tall), "--quick")
+    assert result.code == 0, result.stderr
+    assert "no tables of the paper's" in result.stdout
+    assert "polar table in plain numpy" in result.stdout
+
+
+def test_built_in_surfaces_are_sound() -> None:
+    with _paths(()) as paths:
+        assert [load(path).name for path in paths] == ["elaphe", "xenopeltis", "blazed"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(tool: Tool) -> None:
+    (tool.folder / "taken").write_text("", encoding="utf-8")
+    result = tool("bench", tool.config(), "--quick", "--out", "taken")
+    assert result.code in (2, 7)
+    assert "taken" in result.stderr

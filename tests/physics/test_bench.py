@@ -1,0 +1,154 @@
+"""The bench's other ways to the same numbers, its counts of work, and its verdicts."""
+
+import numpy as np
+import pytest
+
+from kernels import device
+from pipeline.bench import machine, memory, nufft, plain, polar_bake, setting, work
+from pipeline.bench.criteria import Criterion
+from pipeline.bench.machine import Machine, Timed, Work
+from pipeline.bench.setting import Setting
+from pipeline.bench.truth import MapTruth
+from pipeline.config import Coherence, Config, Material, Mirror, PolarLayout, Spectrum, Surface
+from pipeline.surface.heightfield import HeightField
+from pipeline.validation import relative_error
+
+SIGMA_UM = 2.0
+
+
+def config(**sections: object) -> Config:
+    base = {"coherence": Coherence(sigma_um=SIGMA_UM), "spectrum": Spectrum(range_nm=(520.0, 560.0))}
+    return Config(name="small", surface=Surface(recipe=Mirror(kind="mirror")), **{**base, **sections})
+
+
+def rough(pitch_um: tuple[float, float] = (0.1, 0.11), rows: int = 64) -> HeightField:
+    rng = np.random.default_rng(4)
+    return HeightField(rng.uniform(-0.08, 0.08, (rows, 80)), pitch_um)
+
+
+CASES = {
+    "plain": (rough(), config()),
+    # |f| beyond 1 / (2 pitch) is unknown and dark
+    "coarse scan": (rough((0.2, 0.19)), config()),
+    "patch wider than the window": (rough(rows=32), config(coherence=Coherence(sigma_um=0.8))),
+    "gold": (rough(), config(material=Material(fresnel="conductor"))),
+}
+
+
+@pytest.fixture(params=CASES)
+def case(request: pytest.FixtureRequest) -> Setting:
+    field, chosen = CASES[request.param]
+    return setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
+
+
+def test_plain_numpy_gives_the_samples(case: Setting) -> None:
+    """One texel after the other, from the same stack: what is left is E's interpolation."""
+    built = case.stack()
+    samples = case.samples(case.spectrum(built))
+    coefficients = plain.complex_coefficients(built)
+    rho, phi = case.plan.rings.rho(), case.plan.azimuths.angles()
+    for ring, azimuth in ((0, 5), (7, 40), (15, 90), (23, 61)):
+        uv = rho[ring] * np.array([np.cos(phi[azimuth]), np.sin(phi[azimuth])])
+        found = plain.polar_texel(built, coefficients, case.rule_of_ring(ring), uv, case.series(ring))
+        error = relative_error(samples[ring, :, :, azimuth], found, 1e-4 * samples.max())
+        assert error.median < 1e-3
+        assert error.maximum < 0.05
+
+
+def test_nufft_gives_the_samples(case: Setting) -> None:
+    pytest.importorskip("finufft")
+    samples = case.samples(case.spectrum(case.stack()))
+    routed = nufft.run(case, 48, 1)
+    # all of half a turn; the other half follows, for heights are real
+    error = relative_error(routed.samples.astype(float), samples, 1e-4 * samples.max())
+    assert error.median < 1e-3
+    # E steps to 0 where the band ends, and its interpolation rounds the step off
+    assert error.percentile_99 < 0.05
+    assert nufft.points_of(case) == routed.points
+    assert routed.seconds(case) > routed.fixed_s > 0.0
+
+
+def test_a_bake_is_timed_kernel_by_kernel() -> None:
+    field, chosen = CASES["plain"]
+    made = setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
+    baked = polar_bake.bake(made, 2)
+    assert baked.stages.total > baked.stages.table > baked.kernel_s["apply_operator"] > 0.0
+    assert baked.second_light_s is not None
+    assert [timed.work.stage for timed in polar_bake.stages(made, baked)] == [
+        "stack",
+        "spectrum",
+        "build_operator",
+        "apply_operator",
+        "splines",
+    ]
+
+
+def test_the_spectrum_needs_what_its_loops_do() -> None:
+    """Per radius and azimuth of half a turn: every tap of every term, complex, and every term at every node in s."""
+    field, chosen = CASES["plain"]
+    made = setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
+    built = made.stack()
+    taps = (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
+    per_pair = 2 * (taps * 2 * made.needed_terms + 2 * made.needed_terms * made.plan.s_nodes)
+    found = work.spectrum(made, built, made.spectrum(built))
+    assert found.flops == per_pair * len(made.radius_per_um) * 48
+    assert made.needed_terms <= built.terms
+
+
+def test_a_share_is_of_what_binds() -> None:
+    limits = Machine("device", 2, single_flops=100.0, double_flops=50.0, bandwidth=10.0)
+    reached = machine.share(Timed(Work("x", "single", flops=100.0, bytes=5.0), 2.0), limits)
+    assert (reached.peak_share, reached.bandwidth_share) == (0.5, 0.25)
+    assert (reached.bound, reached.bound_share) == ("arithmetic", 0.5)
+    reached = machine.share(Timed(Work("x", "double", flops=10.0, bytes=15.0), 2.0), limits)
+    assert (reached.bound, reached.bound_share) == ("bandwidth", 0.75)
+
+
+def test_the_device_is_measured() -> None:
+    single, double = (device.measure_peak(precision, 0.05) for precision in ("single", "double"))
+    assert single > 1e8
+    assert double > 1e8
+    assert device.measure_bandwidth(0.05) > 1e8
+
+
+def test_launches_are_heard_only_while_one_listens() -> None:
+    with device.timing() as outer:
+        with device.timing() as inner:
+            device.measure_peak("single", 0.001)
+        heard = len(inner)
+        device.measure_peak("single", 0.001)
+    assert {launch.kernel for launch in outer} == {"peak"}
+    assert 0 < heard == len(inner) < len(outer)
+
+
+def test_the_map_tells_a_good_table_from_a_bad_one() -> None:
+    field, chosen = CASES["plain"]
+    truth = MapTruth(field, chosen, 41)
+    errors = []
+    for rings, azimuths in ((16, 64), (80, 512)):
+        made = setting.make(field, chosen, PolarLayout(rings=rings, azimuths=azimuths))
+        errors.append(truth.error(made.table(made.spectrum(made.stack()), made.light)).mean)
+    assert errors[1] < 0.3
+    assert errors[0] > 5.0 * errors[1]
+
+
+def test_memory_is_that_of_a_process_of_its_own() -> None:
+    """More than an interpreter with numpy, and not what this process holds."""
+    held = np.ones(2**27)
+    peak = memory.peak_bytes(*CASES["plain"], 24, 96)
+    assert 2**25 < peak < 2**30 <= held.nbytes
+
+
+@pytest.mark.parametrize(
+    ("measured", "sense", "limit", "verdict"),
+    [
+        (0.08, "<=", 0.08, "pass"),
+        (0.081, "<=", 0.08, "MISS"),
+        (50.0, ">=", 50.0, "pass"),
+        (3.0, "<", 3.0, "MISS"),
+        (None, "<", 3.0, "not measured"),
+        (3.0, "<", None, "told"),
+    ],
+)
+def test_verdicts(measured: float | None, sense: str, limit: float | None, verdict: str) -> None:
+    assert Criterion("x", "1", "y", measured, sense, limit, "").verdict == verdict
