@@ -20,6 +20,7 @@ import platformdirs
 from filelock import FileLock
 
 DEVICE_VARIABLE = "DIFFRACT_BAKE_DEVICE"
+_LINE = 64  # bytes of a cache line, and of a vector
 REMEDY = (
     "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
     "`conda install -c conda-forge pocl`; then `diffract-bake doctor` shows what was found"
@@ -224,10 +225,23 @@ def download(buffer: Any, out: np.ndarray) -> np.ndarray:
     return out
 
 
+def empty(shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+    """An array that begins on a cache line: elsewhere every vector that a kernel loads would touch two."""
+    bytes_ = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+    raw = np.empty(bytes_ + _LINE, np.uint8)
+    first = -raw.ctypes.data % _LINE
+    return np.ndarray(shape, dtype, raw.data, first)
+
+
 def shared(array: np.ndarray) -> Any:
     """A device buffer in the array's own memory where the device shares it; `settle` it before reading the array."""
     cl = _opencl()
     return cl.Buffer(default_device().context, cl.mem_flags.READ_WRITE | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
+
+
+def lent(array: np.ndarray) -> Any:
+    """A device buffer to read from: the array's own memory where that begins on a cache line, else a copy."""
+    return shared(array) if array.ctypes.data % _LINE == 0 else upload(array)
 
 
 def settle(buffer: Any, array: np.ndarray) -> np.ndarray:

@@ -61,10 +61,10 @@ def upload_stack(
     offsets = [np.arange(-r, r + 1) * d for r, d in zip(reach, spacing_per_um, strict=True)]
     decay = np.exp(-(np.concatenate(offsets) ** 2) * inverse).astype(coefficients.dtype)
     if terms == blocks * lanes:
-        buffer = device.shared(coefficients)
+        buffer = device.lent(coefficients)
     else:
-        padded = np.zeros((rows, columns, 2, blocks * lanes), coefficients.dtype)
-        padded[..., :terms] = coefficients
+        padded = device.empty((rows, columns, 2, blocks * lanes), coefficients.dtype)
+        padded[..., :terms], padded[..., terms:] = coefficients, 0.0
         buffer = device.shared(padded)
     return DeviceStack(buffer, device.upload(decay), grid, constants, half_range_um, band_per_um)
 

@@ -31,7 +31,7 @@ def polar_spectrum(
     constants = {key: stack.constants[key] for key in ("BLOCKS", "REACH_X", "REACH_Y")}
     program = device.program(("polar_spectrum.cl",), {**constants, "S_BLOCKS": s_blocks, "S_NODES": nodes})
     inputs = [device.upload(a) for a in (radius_per_um, directions, padded)]
-    out = np.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
+    out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
     result = device.shared(out)
     program.launch(
         "polar_spectrum",
@@ -125,8 +125,8 @@ def integrate(
         w_node,
         matrix,
     )
-    out = np.empty((len(rho), outputs, LANES * tiles), np.float32)
-    power, result = device.shared(spectrum), device.shared(out)
+    out = device.empty((len(rho), outputs, LANES * tiles), np.float32)
+    power, result = device.lent(spectrum), device.shared(out)
     program.launch("apply_operator", (len(rho), tiles, groups), power, np.int32(radii), places, matrix, result)
     return device.settle(result, out)
 
@@ -188,7 +188,7 @@ def look_up(table: np.ndarray, ring: np.ndarray, azimuth: np.ndarray, x: np.ndar
         device.result_buffer(out.nbytes),
     )
     sizes = np.int32(rings), np.int32(azimuths)
-    _spline_program(outputs).launch("look_up", (len(ring),), device.shared(table), *sizes, cells, places, result)
+    _spline_program(outputs).launch("look_up", (len(ring),), device.lent(table), *sizes, cells, places, result)
     return device.download(result, out)[:, :3]
 
 

@@ -7,16 +7,17 @@ Two series share one form, sum_n c_n(k w) t^n or T_n(t), t = h / H in [-1, 1]:
 """
 
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import floor
-from queue import SimpleQueue
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.fft import next_fast_len
+from scipy.fft import fft, next_fast_len, rfft
 
+from kernels import device
 from pipeline.errors import AccuracyError
 from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
 from pipeline.optics.geometry import Array
@@ -88,16 +89,14 @@ def build(
     )
     shape = (2 * psi_max + 1, phi_max + reach[0] + 1, 2, terms)
     _check_memory(shape, np.dtype(dtype).itemsize)
-    coefficients = np.empty(shape, dtype)
-    half_range = field.half_range_um
-    t = field.heights_um / half_range if half_range > 0 else field.heights_um
-    # terms are made sample by sample, so the origin can move to sample 0 once for all
-    series = _Series(np.fft.ifftshift(t), basis)
+    coefficients = device.empty(shape, dtype)
     together = min(terms, _LINE_BYTES // np.dtype(dtype).itemsize)
+    series = _Series(field, basis)
     transform = _PrunedTransform(field.shape, psi_max, phi_max, reach[0], together, dtype)
     for first in range(0, terms, together):
-        transform(series, first, coefficients[..., first : first + together])
+        transform(series, coefficients[..., first : first + together])
         progress("stack", min(1.0, (first + together) / terms))
+    half_range = field.half_range_um
     return Stack(basis, coefficients, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
 
 
@@ -140,22 +139,33 @@ def window_reach(spacing: tuple[float, float], sigma_um: float, tolerance: float
 
 
 class _Series:
-    """t^n or T_n(t), n = 0, 1, ..., by recurrence; row blocks are independent of each other."""
+    """t^n or T_n(t), n = 0, 1, ..., by recurrence, t = h / H; row blocks are independent of each other.
 
-    def __init__(self, t: Array, basis: Basis) -> None:
-        self._t, self._basis = t, basis
-        # T_n takes the place of T_(n-2); powers need one place only
-        self._places = [np.ones_like(t), t.copy()] if basis == "chebyshev" else [np.ones_like(t)]
+    Rows and columns begin at the middle sample: terms are made sample by sample, so the origin moves to sample 0.
+    """
 
-    def term(self, rows: slice, n: int) -> Array:
-        """The n-th term of a row block; ask each block for every n in order, once."""
-        t, term = self._t[rows], self._places[n % len(self._places)][rows]
-        if self._basis == "taylor" and n > 0:
-            term *= t
-        elif n > 1:
-            # T_n = 2 t T_(n-1) - T_(n-2)
-            np.subtract(2.0 * t * self._places[(n - 1) % 2][rows], term, out=term)
-        return term
+    def __init__(self, field: HeightField, basis: Basis) -> None:
+        self._heights, self._basis = field.heights_um, basis
+        self._scale = 1.0 / field.half_range_um if field.half_range_um > 0 else 1.0
+        self._begun: dict[int, Iterator[Array]] = {}
+
+    def terms(self, rows: slice) -> Iterator[Array]:
+        """The terms of a row block from where its last ones ended; each holds until the next is asked for."""
+        return self._begun.setdefault(rows.start, self._from_first(rows))
+
+    def _from_first(self, rows: slice) -> Iterator[Array]:
+        ny, nx = self._heights.shape
+        block = self._heights[np.arange(rows.start + ny // 2, rows.stop + ny // 2) % ny]
+        t = self._scale * np.concatenate([block[:, nx // 2 :], block[:, : nx // 2]], axis=1)
+        before, term = t.copy(), np.ones_like(t)
+        while True:
+            yield term
+            # T_(n+1) = 2 t T_n - T_(n-1) takes the place of T_(n-1); T_(-1) = T_1 = t
+            following = t * term
+            if self._basis == "chebyshev":
+                following *= 2.0
+                following -= before
+            before, term = term, following
 
 
 class _PrunedTransform:
@@ -168,59 +178,38 @@ class _PrunedTransform:
     def __init__(
         self, shape: tuple[int, int], psi_max: int, phi_max: int, reach_x: int, together: int, dtype: DTypeLike
     ) -> None:
-        import pyfftw
-
         ny, nx = shape
         phi = (np.arange(-reach_x, phi_max + 1) + nx // 2) % nx - nx // 2
         self._samples = ny * nx
         self._columns, self._mirrored = np.abs(phi), phi < 0
-        self._kept = int(self._columns.max()) + 1
         self._rows = np.arange(-psi_max, psi_max + 1) % ny
-        self._block = max(1, _BLOCK_SAMPLES // nx)
-        self._blocks = [slice(first, min(first + self._block, ny)) for first in range(0, ny, self._block)]
-        real, self._complex = np.dtype(dtype), np.result_type(dtype, np.complex64)
-        # every plane begins on a cache line, as the plan expects
-        line = _LINE_BYTES // self._complex.itemsize
-        padded = -(-self._kept // line) * line
-        self._narrow = pyfftw.empty_aligned((together, ny, padded), dtype=self._complex, n=_LINE_BYTES)
-        # planning by measurement costs seconds and wins milliseconds on a few dozen transforms
-        flags = ("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT")
-        self._threads = os.cpu_count() or 1
-        # buffers and plans are no two threads' at once
-        self._along_x: SimpleQueue[Any] = SimpleQueue()
-        for _ in range(self._threads):
-            rows = pyfftw.empty_aligned((self._block, nx), dtype=real)
-            half = pyfftw.empty_aligned((self._block, nx // 2 + 1), dtype=self._complex)
-            self._along_x.put(pyfftw.FFTW(rows, half, axes=(1,), flags=flags))
-        plane = self._narrow[0, :, : self._kept]
-        self._along_y = pyfftw.FFTW(plane, plane, axes=(0,), flags=flags, threads=self._threads)
+        block = max(1, _BLOCK_SAMPLES // nx)
+        self._blocks = [slice(first, min(first + block, ny)) for first in range(0, ny, block)]
+        self._real = np.dtype(dtype)
+        shape_kept = (together, ny, int(self._columns.max()) + 1)
+        self._narrow = np.empty(shape_kept, np.result_type(dtype, np.complex64))
 
-    def __call__(self, series: _Series, first: int, out: NDArray[Any]) -> None:
-        """Terms `first` ... of a series into `out` (rows, columns, 2, terms)."""
-        terms = range(out.shape[3])
+    def __call__(self, series: _Series, out: NDArray[Any]) -> None:
+        """The next terms of a series into `out` (rows, columns, 2, terms)."""
+        narrow, kept, threads = self._narrow[: out.shape[3]], self._narrow.shape[2], os.cpu_count() or 1
 
         def along_x(rows: slice) -> None:
-            plan = self._along_x.get()
-            for n in terms:
-                plan.input_array[: rows.stop - rows.start] = series.term(rows, first + n)
-                self._narrow[n, rows, : self._kept] = plan()[: rows.stop - rows.start, : self._kept]
-            self._along_x.put(plan)
+            for plane, term in zip(narrow, series.terms(rows), strict=False):
+                plane[rows] = rfft(term.astype(self._real, copy=False), axis=1)[:, :kept]
 
-        with ThreadPoolExecutor(self._threads) as pool:
+        with ThreadPoolExecutor(threads) as pool:
             list(pool.map(along_x, self._blocks))
-            for n in terms:
-                plane = self._narrow[n, :, : self._kept]
-                self._along_y.update_arrays(plane, plane)
-                self._along_y.execute()
+            for plane in narrow:
+                plane[...] = fft(plane, axis=0, workers=threads)
             list(pool.map(lambda row: self._take(row, out), range(out.shape[0])))
 
     def _take(self, row: int, out: NDArray[Any]) -> None:
         """One row of coefficients, from the transform's row and, where phi < 0, from its mirror image."""
         terms = out.shape[3]
         psi = self._rows[row]
-        right, left = self._narrow[:terms, psi], self._narrow[:terms, -psi]
-        found = np.where(self._mirrored, left[:, self._columns], np.conj(right[:, self._columns])).T
-        found /= self._samples
+        found = np.conj(self._narrow[:terms, psi][:, self._columns])
+        found[:, self._mirrored] = self._narrow[:terms, -psi][:, self._columns[self._mirrored]]
+        found = found.T / self._samples
         out[row, :, 0], out[row, :, 1] = found.real, found.imag
 
 

@@ -16,6 +16,7 @@ _COLUMNS = (
     "method",
     "rings",
     "azimuths",
+    "w_terms",
     "resolution",
     "step_nm",
     "textures",

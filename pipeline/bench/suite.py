@@ -33,6 +33,7 @@ GRATING = PolarLayout(rings=300, azimuths=832, w_terms=12)
 # of the mirror: what is darker is compared with it, not with itself
 _FLOOR = 1e-7
 _SEED = 3
+_GRATING_STRETCH = 0.5
 
 
 @dataclass(frozen=True)
@@ -225,7 +226,9 @@ class _Suite:
 
     def _polar(self, main: Setting, baked: PolarBake, routed: NufftRun | None, numpy_pair_s: float) -> None:
         """The polar table over its grid; the same tables by FINUFFT and by plain numpy, which err by as much."""
-        for i, layout in enumerate(self._effort.polar):
+        grating = main.plan.azimuths.stretch < _GRATING_STRETCH
+        layouts = [layout for layout in self._effort.polar if layout != GRATING or grating]
+        for i, layout in enumerate(layouts):
             chosen, made = main, baked
             if layout != MAIN:
                 chosen = setting.make(self._field, self._config, layout)
@@ -245,7 +248,7 @@ class _Suite:
             ]
             if routed:
                 self._points.append(replace(point, method=NUFFT, seconds=routed.seconds(chosen), scaled=True))
-            self._progress("polar tables", (i + 1) / len(self._effort.polar))
+            self._progress("polar tables", (i + 1) / len(layouts))
 
     def _textures(self, main: Setting, baked: PolarBake) -> None:
         """The polar table in few RGBA textures of half floats."""

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("cli", "pipeline", "kernels")
-HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "pyfftw", "OpenEXR", "PIL", "SurfaceTopography"}
+HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "OpenEXR", "PIL", "SurfaceTopography"}
 STAGE_FREE = ("tables", "stack.py", "reference.py", "validation.py", "optics", "series.py", "surface")
 
 

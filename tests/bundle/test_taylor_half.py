@@ -13,7 +13,7 @@ from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
 from pipeline.directions import random_pairs
-from pipeline.errors import AccuracyError, ConfigError
+from pipeline.errors import AccuracyError
 from pipeline.evaluate import table_evaluator
 from pipeline.optics.colour_error import delta_e
 from pipeline.stages import taylor_table

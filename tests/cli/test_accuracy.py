@@ -30,7 +30,9 @@ def test_a_missed_budget_fails_after_all_is_written(copy: Tool) -> None:
     result = copy("run", copy.config(accuracy={"delta_e": 0.001}), "--out", "missed")
     assert result.code == 4
     (line,) = result.errors
-    assert re.search(r"small: accuracy\.delta_e asks for 0\.001 at 7500 RU, measured [0-9.]+\. Raise the budget", line)
+    assert re.search(
+        r"small: accuracy\.delta_e asks for 0\.001 at 7500 RU, measured [0-9.]+\. Raise the budget", line
+    )
     shown = {path.name for path in (copy.folder / "missed" / "small").iterdir()}
     assert {"map_theta0_phi0.exr", "map_theta0_phi0.png", "report.html"} < shown
     assert any(name.startswith("small-1.0.0+") for name in shown)
