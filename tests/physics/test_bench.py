@@ -135,7 +135,7 @@ def test_the_map_tells_a_good_table_from_a_bad_one() -> None:
 def test_memory_is_that_of_a_process_of_its_own() -> None:
     """More than an interpreter with numpy, and not what this process holds."""
     held = np.ones(2**27)
-    peak = memory.peak_bytes(*CASES["plain"], 24, 96)
+    peak = memory.peak_bytes(*CASES["plain"], PolarLayout(rings=24, azimuths=96))
     assert 2**25 < peak < 2**30 <= held.nbytes
 
 
