@@ -67,12 +67,13 @@ def _points(y_max: float, rule: Quadrature) -> int:
 def _response(rule: Quadrature, y: Array) -> Array:
     """D(y) of X, Y, Z (len(y), 3), over each channel's own integral."""
     turns = np.outer(y, 1e3 / rule.lambda_nm)
-    # whole turns go first: what is left keeps its digits in single precision, which is twice as fast
+    # whole turns go first: what is left keeps its digits in single precision, whose sine and cosine are much faster
     turns -= np.rint(turns)
-    phase = np.exp(np.complex64(2j * np.pi) * turns.astype(np.float32))
+    phase = (2.0 * np.pi * turns).astype(np.float32)
     # a channel that sees nothing has no error either
     total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
-    return np.asarray(phase @ (rule.weights / total))
+    shares = (rule.weights / total).astype(np.float32)
+    return np.asarray(np.cos(phase) @ shares + 1j * (np.sin(phase) @ shares))
 
 
 def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:
