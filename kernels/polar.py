@@ -90,8 +90,8 @@ def integrate(
         },
     )
     extent = extents(radius_per_um, rho, quadratures, nodes)
-    values_to_terms, _ = _chebyshev(nodes)
-    w_values_to_terms, _ = _chebyshev(w_terms)
+    values_to_terms, _ = chebyshev(nodes)
+    w_values_to_terms, _ = chebyshev(w_terms)
     radius, rings, wavelengths, weights, spans, places, reflected, cardinal, cosine, w_node = (
         device.upload(a)
         for a in (
@@ -149,10 +149,10 @@ def extents(radius_per_um: np.ndarray, rho: np.ndarray, quadratures: RingQuadrat
 
 def w_nodes(w_terms: int) -> np.ndarray:
     """Where E is taken over |w|, as shares of w_max: Chebyshev's nodes on [0, 1]."""
-    return 0.5 * (_chebyshev(w_terms)[1] + 1.0)
+    return 0.5 * (chebyshev(w_terms)[1] + 1.0)
 
 
-def _chebyshev(count: int) -> tuple[np.ndarray, np.ndarray]:
+def chebyshev(count: int) -> tuple[np.ndarray, np.ndarray]:
     """The matrix from values at Chebyshev's nodes to coefficients of T_k, and the nodes in [-1, 1]."""
     k = np.arange(count)
     angle = np.pi * (k + 0.5) / count

@@ -21,8 +21,8 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar_grid import Azimuths
 
-# distances of radii in sigma_f. An integral over wavelengths averages what interpolation on 8 nodes leaves, 1e-4 of E
-# at one sigma_f; a laser line shows it. Near the origin the specular lobe's flank is seen at full contrast.
+# distances of radii in sigma_f. At one, interpolation on 8 nodes leaves up to a tenth of E, which an integral over
+# wavelengths averages out; a laser line shows it. Near the origin the lobe's flank is seen at full contrast.
 SPACING, SPACING_OF_A_LINE, _SPACING_AT_ZERO = 1.0, 0.4, 0.25
 _COARSENS_OVER = 30.0  # sigma_f
 _SPARE_RADII = 5
@@ -76,7 +76,7 @@ def speckle_contrast(spectrum: PolarSpectrum) -> float:
 
 def s_nodes(count: int, s_max_per_um: float) -> Array:
     """Chebyshev's nodes on [0, s_max]."""
-    return np.asarray(0.5 * s_max_per_um * (1.0 + np.cos(pi * (np.arange(count) + 0.5) / count)))
+    return np.asarray(0.5 * s_max_per_um * (1.0 + polar.chebyshev(count)[1]))
 
 
 def radii(sigma_um: float, r_max_per_um: float, spacing: float = SPACING) -> Array:

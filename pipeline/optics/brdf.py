@@ -51,12 +51,7 @@ def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Arra
     """What of R stays inside the spectral integral (..., L) at half angles (...,): a metal's; 1 of all else."""
     if material.fresnel != "conductor":
         return np.ones((*np.shape(cos_half), len(lambda_nm)))
-    values = fresnel.reflectance(np.asarray(cos_half)[..., None], fresnel.metal_index(material.metal, lambda_nm))
-    if material.normalisation == "absolute":
-        return values
-    light = trapezoid(spectrum, FINE_STEP_NM)
-    index = fresnel.metal_index(material.metal, light.lambda_nm)
-    return np.asarray(values / _luminous_mean(fresnel.reflectance(1.0, index), light))
+    return _metal(material, trapezoid(spectrum, FINE_STEP_NM), lambda_nm, cos_half)
 
 
 def integrand(material: Material, spectrum: Spectrum, step_nm: float, sigma_um: float) -> Quadrature:
@@ -88,11 +83,16 @@ def relative_unit(material: Material, quadrature: Quadrature, sigma_um: float) -
 
 def metal_reflectance(material: Material, quadrature: Quadrature, cos_half: Array) -> Array:
     """R_l(half angle) (..., L) of the metal; `relative` divides by its luminous mean at normal incidence."""
-    index = fresnel.metal_index(material.metal, quadrature.lambda_nm)
-    values = fresnel.reflectance(np.asarray(cos_half)[..., None], index)
+    return _metal(material, quadrature, quadrature.lambda_nm, cos_half)
+
+
+def _metal(material: Material, light: Quadrature, lambda_nm: Array, cos_half: Array) -> Array:
+    """R (..., L) of the metal at wavelengths; `relative` divides by its luminous mean under `light`."""
+    values = fresnel.reflectance(np.asarray(cos_half)[..., None], fresnel.metal_index(material.metal, lambda_nm))
     if material.normalisation == "absolute":
         return values
-    return np.asarray(values / _luminous_mean(fresnel.reflectance(1.0, index), quadrature))
+    index = fresnel.metal_index(material.metal, light.lambda_nm)
+    return np.asarray(values / _luminous_mean(fresnel.reflectance(1.0, index), light))
 
 
 def _reflectance(material: Material, quadrature: Quadrature, cos_half: Array) -> Array:

@@ -42,8 +42,9 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     table = polar.build(power, plan.rings, rules, plan.w_terms, reflectance)
     progress("table", 1.0)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
-    certified = certificate.certify(table_evaluator(table, config), surface.load(inputs["surface"]), config, progress)
-    spectral = certificate.certify_spectral(power, config, surface.load(inputs["surface"]))
+    field = surface.load(inputs["surface"])
+    certified = certificate.certify(table_evaluator(table, config), field, config, progress)
+    spectral = certificate.certify_spectral(power, config, field)
     arrays.save(
         folder / _FILE,
         {

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.polar import chebyshev
 from pipeline.optics.geometry import Array
 from pipeline.spectrum import PolarSpectrum
 
@@ -31,9 +32,7 @@ def build(spectrum: PolarSpectrum) -> SpectralTable:
     """The spectral table of a power spectrum."""
     tiles, radii, nodes, lanes = spectrum.values.shape
     e = np.moveaxis(spectrum.values, 3, 1).reshape(tiles * lanes, radii, nodes)
-    angle = np.pi * (np.arange(nodes) + 0.5) / nodes
-    terms = np.cos(np.outer(np.arange(nodes), angle)) * 2.0 / nodes
-    terms[0] /= 2.0
+    terms, _ = chebyshev(nodes)
     in_s = e @ terms.T.astype(np.float32)
     # samples of a periodic spline are its coefficients seen through (1, 4, 1) / 6
     through = (4.0 + 2.0 * np.cos(2.0 * np.pi * np.fft.rfftfreq(len(e)))) / 6.0
