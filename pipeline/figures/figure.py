@@ -1,0 +1,82 @@
+"""One page of the validation bench: what was expected, what was measured, and the verdict."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pipeline.config import Config
+from pipeline.progress import Progress
+from pipeline.surface.heightfield import HeightField
+
+
+@dataclass(frozen=True)
+class Check:
+    """One statement of a page. holds: None where it is told beside a published value and not judged."""
+
+    what: str
+    expected: str
+    measured: str
+    holds: bool | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text under column names, and what they tell."""
+
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A PNG and what it shows."""
+
+    png: bytes
+    caption: str
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A page.
+
+    name: of its file. source: the figure or table it stands beside. expected: what the source or theory says, in a
+    sentence or two. remarks: what explains a difference. numbers: everything measured, for machines.
+    """
+
+    name: str
+    title: str
+    source: str
+    expected: str
+    checks: Sequence[Check]
+    tables: Sequence[Table] = ()
+    pictures: Sequence[Picture] = ()
+    remarks: Sequence[str] = ()
+    numbers: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface of the bench. scan: whether it was measured, and not made by a recipe."""
+
+    config: Config
+    field: HeightField
+    scan: bool
+
+    @property
+    def name(self) -> str:
+        return self.config.name
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What the pages are made of. quick: smaller maps and fewer points, for a first look and for tests."""
+
+    blazed: Surface
+    elaphe: Surface
+    xenopeltis: Surface
+    quick: bool
+
+
+# a page's maker
+MakeFigure = Callable[[Bench, Progress], Figure]
