@@ -14,7 +14,7 @@ def doctor_command(as_json: bool) -> None:
     """
     from kernels import device
     from pipeline import provenance
-    from pipeline.device_stack import require_device
+    from pipeline.working_device import require_device
 
     probes = device.probe_devices()
     versions = provenance.versions()

@@ -7,7 +7,7 @@ cannot compile for it. Contexts do not survive a fork, so they are made lazily, 
 import os
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -112,11 +112,12 @@ def _probe(platform: Any, device: Any) -> Probe:
 
 @dataclass(frozen=True)
 class Device:
-    """The device in use, its context and its in-order queue."""
+    """The device in use, its context and its in-order queue. shares_memory: whether its memory is the process's."""
 
     name: str
     driver: str
     compute_units: int
+    shares_memory: bool
     context: Any
     queue: Any
 
@@ -133,19 +134,20 @@ def default_device() -> Device:
         if not probe.fault and wanted.lower() in f"{probe.platform} {probe.device}".lower():
             context = _opencl().Context([probe.handle])
             queue = _opencl().CommandQueue(context)
-            return Device(probe.device, probe.driver, probe.compute_units, context, queue)
+            shares = bool(probe.handle.host_unified_memory)
+            return Device(probe.device, probe.driver, probe.compute_units, shares, context, queue)
     tried = "; ".join(f"{p.device}: {p.fault or 'works, but not asked for'}" for p in probes) or "none is listed"
     asked = f" named like {wanted!r} (from {DEVICE_VARIABLE})" if wanted else ""
     raise NoDeviceError(f"no working OpenCL device{asked}: {tried}. To mend it, {REMEDY}")
 
 
-def program(sources: tuple[str, ...], constants: dict[str, int]) -> "Program":
+def program(sources: tuple[str, ...], constants: Mapping[str, int | str]) -> "Program":
     """The built program of these sources and constants, one for the whole process."""
     return _programs(sources, tuple(sorted(constants.items())))
 
 
 @cache
-def _programs(sources: tuple[str, ...], constants: tuple[tuple[str, int], ...]) -> "Program":
+def _programs(sources: tuple[str, ...], constants: tuple[tuple[str, int | str], ...]) -> "Program":
     return Program(sources, dict(constants))
 
 
@@ -174,7 +176,7 @@ def timing() -> Iterator[list[Launch]]:
 class Program:
     """OpenCL sources built with constants, their kernels ready to launch on the default device."""
 
-    def __init__(self, sources: Sequence[str], constants: dict[str, int]) -> None:
+    def __init__(self, sources: Sequence[str], constants: Mapping[str, int | str]) -> None:
         cl = _opencl()
         self.device = default_device()
         text = "\n".join(source(name) for name in sources)
@@ -214,9 +216,11 @@ def upload(array: np.ndarray) -> Any:
 
 
 def result_buffer(nbytes: int) -> Any:
-    """A device buffer for a kernel's output."""
-    cl = _opencl()
-    return cl.Buffer(default_device().context, cl.mem_flags.WRITE_ONLY, nbytes)
+    """A device buffer for what kernels write; of whole large pages where the device shares this memory."""
+    cl, used = _opencl(), default_device()
+    if used.shares_memory:
+        return shared(empty((nbytes,), np.uint8))
+    return cl.Buffer(used.context, cl.mem_flags.READ_WRITE, nbytes)
 
 
 def download(buffer: Any, out: np.ndarray) -> np.ndarray:

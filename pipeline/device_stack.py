@@ -2,17 +2,9 @@
 
 from kernels import device, diffraction
 from pipeline import digest
-from pipeline.errors import DeviceError
 from pipeline.optics.coherence import sigma_f
 from pipeline.stack import Stack
-
-
-def require_device() -> None:
-    """Raises DeviceError, with what was tried and the remedy, where no device works."""
-    try:
-        device.default_device()
-    except device.NoDeviceError as error:
-        raise DeviceError(str(error)) from None
+from pipeline.working_device import require_device
 
 
 def upload(built: Stack) -> diffraction.DeviceStack:

@@ -7,7 +7,6 @@ from typing import Any
 
 from pipeline import provenance
 from pipeline.config import Config, PolarLayout
-from pipeline.device_stack import require_device
 from pipeline.progress import Progress, silent
 from pipeline.stages import table, validate
 from pipeline.stages.render import RENDER
@@ -16,9 +15,10 @@ from pipeline.stages.stack import STACK
 from pipeline.stages.stage import Stage
 from pipeline.stages.surface import SURFACE
 from pipeline.store import Artifact, Store
+from pipeline.working_device import require_device
 
 UNCHANGED = "nothing it reads has changed"
-_ON_DEVICE = {"spectrum", "table", "render", "validate"}
+_ON_DEVICE = {"stack", "spectrum", "table", "render", "validate"}
 
 
 def stages(config: Config) -> tuple[Stage, ...]:

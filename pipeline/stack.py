@@ -6,31 +6,26 @@ Two series share one form, sum_n c_n(k w) t^n or T_n(t), t = h / H in [-1, 1]:
 - Chebyshev (Jacobi-Anger): terms T_n(t), c_n = (2 - [n = 0]) i^n J_n(k w H).
 """
 
-import os
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import floor
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.fft import fft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
-from kernels import device
+from kernels import device, dft_stack
+from kernels.dft_stack import Kept
 from pipeline.errors import AccuracyError
 from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
+from pipeline.working_device import require_device
 
 Basis = Literal["taylor", "chebyshev"]
 # 1e-12 of the window's sum is lost to the gaps between samples
 LEAST_SIGMA_PITCHES = 1.2
 _MOST_BYTES = 6 * 2**30
-# terms transformed together fill whole cache lines of the coefficients; rows of one block stay in a core's cache
-_LINE_BYTES = 64
-_BLOCK_SAMPLES = 2**15
 
 
 @dataclass(frozen=True)
@@ -73,9 +68,8 @@ def build(
 ) -> Stack:
     """The stack of `terms` terms for |f| <= `frequency_max_per_um` and the band, window cut at `tolerance`.
 
-    Terms are made in float64 whatever `dtype` they are transformed and kept in: a recurrence in float32 would lose
-    n^2 of its digits at |t| = 1. Raises AccuracyError where the stack would not fit into memory, or the samples do
-    not resolve the window.
+    Terms are made in float64 whatever `dtype` they are transformed and kept in. Raises AccuracyError where the stack
+    would not fit into memory, or the samples do not resolve the window; DeviceError where no device works.
     """
     _check_window(sigma_um, field.pitch_um)
     # centred after the crop: what is left may lie off the whole patch's mid-range
@@ -89,14 +83,16 @@ def build(
     )
     shape = (2 * psi_max + 1, phi_max + reach[0] + 1, 2, terms)
     _check_memory(shape, np.dtype(dtype).itemsize)
-    coefficients = device.empty(shape, dtype)
-    together = min(terms, _LINE_BYTES // np.dtype(dtype).itemsize)
-    series = _Series(field, basis)
-    transform = _PrunedTransform(field.shape, psi_max, phi_max, reach[0], together, dtype)
-    for first in range(0, terms, together):
-        transform(series, coefficients[..., first : first + together])
-        progress("stack", min(1.0, (first + together) / terms))
     half_range = field.half_range_um
+    require_device()
+    coefficients = dft_stack.transform(
+        field.heights_um,
+        1.0 / half_range if half_range > 0 else 1.0,
+        basis,
+        Kept(psi_max, phi_max, reach[0]),
+        device.empty(shape, dtype),
+        lambda done: progress("stack", done),
+    )
     return Stack(basis, coefficients, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
 
 
@@ -136,81 +132,6 @@ def window_reach(spacing: tuple[float, float], sigma_um: float, tolerance: float
     radius = reach_sigmas(tolerance) * sigma_f(sigma_um)
     x, y = (floor(radius / d + 0.5) for d in spacing)
     return x, y
-
-
-class _Series:
-    """t^n or T_n(t), n = 0, 1, ..., by recurrence, t = h / H; row blocks are independent of each other.
-
-    Rows and columns begin at the middle sample: terms are made sample by sample, so the origin moves to sample 0.
-    """
-
-    def __init__(self, field: HeightField, basis: Basis) -> None:
-        self._heights, self._basis = field.heights_um, basis
-        self._scale = 1.0 / field.half_range_um if field.half_range_um > 0 else 1.0
-        self._begun: dict[int, Iterator[Array]] = {}
-
-    def terms(self, rows: slice) -> Iterator[Array]:
-        """The terms of a row block from where its last ones ended; each holds until the next is asked for."""
-        return self._begun.setdefault(rows.start, self._from_first(rows))
-
-    def _from_first(self, rows: slice) -> Iterator[Array]:
-        ny, nx = self._heights.shape
-        block = self._heights[np.arange(rows.start + ny // 2, rows.stop + ny // 2) % ny]
-        t = self._scale * np.concatenate([block[:, nx // 2 :], block[:, : nx // 2]], axis=1)
-        before, term = t.copy(), np.ones_like(t)
-        while True:
-            yield term
-            # T_(n+1) = 2 t T_n - T_(n-1) takes the place of T_(n-1); T_(-1) = T_1 = t
-            following = t * term
-            if self._basis == "chebyshev":
-                following *= 2.0
-                following -= before
-            before, term = term, following
-
-
-class _PrunedTransform:
-    """mean(a exp(+2 pi i f.x)) of real arrays (ny, nx) at psi = -psi_max.., phi = -reach_x .. phi_max.
-
-    The transform along y is done only for the columns kept. Indices wrap: the DFT is periodic, so sums near
-    the band limit equal those over the samples.
-    """
-
-    def __init__(
-        self, shape: tuple[int, int], psi_max: int, phi_max: int, reach_x: int, together: int, dtype: DTypeLike
-    ) -> None:
-        ny, nx = shape
-        phi = (np.arange(-reach_x, phi_max + 1) + nx // 2) % nx - nx // 2
-        self._samples = ny * nx
-        self._columns, self._mirrored = np.abs(phi), phi < 0
-        self._rows = np.arange(-psi_max, psi_max + 1) % ny
-        block = max(1, _BLOCK_SAMPLES // nx)
-        self._blocks = [slice(first, min(first + block, ny)) for first in range(0, ny, block)]
-        self._real = np.dtype(dtype)
-        shape_kept = (together, ny, int(self._columns.max()) + 1)
-        self._narrow = np.empty(shape_kept, np.result_type(dtype, np.complex64))
-
-    def __call__(self, series: _Series, out: NDArray[Any]) -> None:
-        """The next terms of a series into `out` (rows, columns, 2, terms)."""
-        narrow, kept, threads = self._narrow[: out.shape[3]], self._narrow.shape[2], os.cpu_count() or 1
-
-        def along_x(rows: slice) -> None:
-            for plane, term in zip(narrow, series.terms(rows), strict=False):
-                plane[rows] = rfft(term.astype(self._real, copy=False), axis=1)[:, :kept]
-
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(along_x, self._blocks))
-            for plane in narrow:
-                plane[...] = fft(plane, axis=0, workers=threads)
-            list(pool.map(lambda row: self._take(row, out), range(out.shape[0])))
-
-    def _take(self, row: int, out: NDArray[Any]) -> None:
-        """One row of coefficients, from the transform's row and, where phi < 0, from its mirror image."""
-        terms = out.shape[3]
-        psi = self._rows[row]
-        found = np.conj(self._narrow[:terms, psi][:, self._columns])
-        found[:, self._mirrored] = self._narrow[:terms, -psi][:, self._columns[self._mirrored]]
-        found = found.T / self._samples
-        out[row, :, 0], out[row, :, 1] = found.real, found.imag
 
 
 def _check_memory(shape: tuple[int, ...], itemsize: int) -> None:

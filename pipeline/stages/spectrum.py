@@ -39,8 +39,9 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def planning_kernels() -> list[str]:
-    """Digests of the kernels that make tables of a spectrum: the plan measures with them."""
-    return [digest.of_json(device.source(name)) for name in ("spectral_operator.cl", "cubic_spline.cl")]
+    """Digests of the kernels from the stack to tables of a spectrum: the plan measures with them."""
+    names = "dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl"
+    return [digest.of_json(device.source(name)) for name in names]
 
 
 def _wavelengths(config: Config) -> dict[str, Any]:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import arrays, series
+from kernels import device
+from pipeline import arrays, digest, series
 from pipeline import stack as dft_stack
 from pipeline.config import Config, TaylorLayout
 from pipeline.optics.spectra import trapezoid
@@ -26,6 +27,7 @@ def layout_of(config: Config) -> TaylorLayout:
 def _parameters(config: Config) -> dict[str, Any]:
     table = layout_of(config)
     return {
+        "kernel": digest.of_json(device.source("dft_stack.cl")),
         "spectrum": spectrum_parameters(config),
         "sigma_um": config.coherence.sigma_um,
         "terms": table.terms,

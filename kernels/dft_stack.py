@@ -1,0 +1,105 @@
+"""Host side of opencl/dft_stack.cl: the transforms of every term of a series, of the frequencies kept alone."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, isqrt
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import device
+
+_VECTOR_BYTES = 64
+_KEPT = 10  # frequencies whose sums stay in registers, two vectors each
+_STEP_X, _STEP_Y = 10, 5  # the same of the first step, with sums of two and of four vectors
+_MOST_PAIRS = 128
+_ITEMS_A_UNIT = 4  # work-items, each with scratch that stays in a core's cache
+_AXIS = np.dtype([(name, np.int32) for name in ("n", "n1", "n2", "pairs", "padded", "blocks")])
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The frequencies kept, as indices of the DFT, which wrap: psi from -psi_max on, phi from -reach to phi_max."""
+
+    psi_max: int
+    phi_max: int
+    reach: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(psi, phi)."""
+        return 2 * self.psi_max + 1, self.reach + self.phi_max + 1
+
+
+def transform(
+    heights_um: NDArray[np.float64],
+    scale_per_um: float,
+    series: Literal["chebyshev", "taylor"],
+    kept: Kept,
+    out: NDArray[Any],
+    done: Callable[[float], None],
+) -> NDArray[Any]:
+    """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(term_n(scale h) exp(+2 pi i f.x)).
+
+    x and y count from the middle sample. `done` is told the share of terms that is made. Terms are made in double:
+    a recurrence in single precision would lose n^2 of its digits at |t| = 1.
+    """
+    ny, nx = heights_um.shape
+    lanes, terms = _VECTOR_BYTES // out.dtype.itemsize, out.shape[3]
+    columns, rows = max(kept.phi_max, kept.reach) + 1, kept.shape[0]
+    x = _axis(nx, np.arange(columns), _STEP_X, out.dtype)
+    y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), _STEP_Y, out.dtype)
+    program = device.program(
+        ("dft_stack.cl",),
+        {
+            "REAL": "float" if out.dtype == np.float32 else "double",
+            "LANES": lanes,
+            "CHEBYSHEV": int(series == "chebyshev"),
+            "STEP_X": _STEP_X,
+            "STEP_Y": _STEP_Y,
+            "KEPT": _KEPT,
+            "MOST_PAIRS": _MOST_PAIRS,
+        },
+    )
+    items, room = _ITEMS_A_UNIT * device.default_device().compute_units, max(3 * nx, 2 * ny)
+    scratch = device.result_buffer(_VECTOR_BYTES * items * room), np.int64(room)
+    between = device.empty((columns, ny, 2, lanes), out.dtype)
+    samples, narrow, result = (
+        device.lent(np.ascontiguousarray(heights_um)),
+        device.shared(between),
+        device.shared(out),
+    )
+    mean = out.dtype.type(1.0 / heights_um.size)
+    for first in range(0, terms, lanes):
+        start = np.int32(first)
+        program.launch(
+            "along_x", (items,), samples, np.float64(scale_per_um), start, *x, np.int32(ny), *scratch, narrow
+        )
+        sizes = (np.int32(n) for n in (first, terms, kept.reach, kept.phi_max, rows))
+        program.launch("along_y", (items,), narrow, *y, np.int32(columns), *scratch, *sizes, mean, result)
+        done(min(1.0, (first + lanes) / terms))
+    return device.settle(result, out)
+
+
+def _axis(n: int, kept: NDArray[np.int64], step: int, dtype: Any) -> list[Any]:
+    """The tables of one axis of n = n1 n2 samples, on the device, and its sizes."""
+    n1 = max(d for d in range(1, min(isqrt(n), 2 * _MOST_PAIRS - 2) + 1) if n % d == 0)
+    n2, pairs = n // n1, n1 // 2 + 1
+    padded = step * ceil(pairs / step)
+    angle = 2.0 * np.pi * np.outer(np.arange(pairs), np.arange(padded)) / n1
+    parts = [part for k1 in range(n1) for part in _parts(np.flatnonzero(kept % n1 == k1))]
+    place = np.full((len(parts), _KEPT), -1, np.int32)
+    turn = np.zeros((len(parts), n2, _KEPT))
+    for at, turned, part in zip(place, turn, parts, strict=True):
+        at[: len(part)] = part
+        # whole turns go first: their sines would lose digits
+        turned[:, : len(part)] = 2.0 * np.pi / n * (np.outer(np.arange(n2), kept[part]) % n)
+    tables = np.cos(angle), np.sin(angle), np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    first_of = np.array([kept[part[0]] % n1 for part in parts], np.int32)
+    buffers = [device.upload(a) for a in (*(t.astype(dtype) for t in tables), first_of, place)]
+    return [*buffers, np.array((n, n1, n2, pairs, padded, len(parts)), _AXIS)]
+
+
+def _parts(indices: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    return [indices[first : first + _KEPT] for first in range(0, len(indices), _KEPT)]
