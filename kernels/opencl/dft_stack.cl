@@ -40,7 +40,8 @@ static void terms_of(const double8 t, const int first, __global REAL *out) {
         term = first == 0 ? (double8)1.0 : cos(first * angle);
         before = first == 0 ? t : cos((first - 1) * angle);
     } else {
-        term = pown(t, (int8)first);
+        term = 1.0;
+        for (int n = 0; n < first; ++n) term *= t;
         before = 0.0;
     }
     for (int n = 0; n < LANES; ++n) {
