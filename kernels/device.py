@@ -6,6 +6,7 @@ cannot compile for it. Contexts do not survive a fork, so they are made lazily, 
 
 import os
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from filelock import FileLock
 
 DEVICE_VARIABLE = "DIFFRACT_BAKE_DEVICE"
 _LINE = 64  # bytes of a cache line, and of a vector
+_MOST_SPARE_BYTES = 2**28
 REMEDY = (
     "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
     "`conda install -c conda-forge pocl`; then `diffract-bake doctor` shows what was found"
@@ -230,11 +232,37 @@ def download(buffer: Any, out: np.ndarray) -> np.ndarray:
 
 
 def empty(shape: tuple[int, ...], dtype: Any) -> np.ndarray:
-    """An array that begins on a cache line: elsewhere every vector that a kernel loads would touch two."""
+    """An array that begins on a cache line: elsewhere every vector that a kernel loads would touch two.
+
+    Its memory may have served before: pages that were never touched cost a kernel as much as its work.
+    """
     bytes_ = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-    raw = np.empty(bytes_ + _LINE, np.uint8)
+    raw = np.asarray(_Pages(bytes_ + _LINE))
     first = -raw.ctypes.data % _LINE
-    return np.ndarray(shape, dtype, raw.data, first)
+    array: np.ndarray = raw[first : first + bytes_].view(dtype).reshape(shape)
+    return array
+
+
+_spare: list[np.ndarray] = []
+# collecting garbage may free pages while pages are being taken
+_spare_lock = threading.RLock()
+
+
+class _Pages:
+    """Memory behind arrays, which outlives them: the next array takes it over."""
+
+    def __init__(self, bytes_: int) -> None:
+        with _spare_lock:
+            fitting = (i for i, spare in enumerate(_spare) if bytes_ <= spare.nbytes <= 2 * bytes_)
+            i = next(fitting, None)
+            self._memory = np.empty(bytes_, np.uint8) if i is None else _spare.pop(i)
+        self.__array_interface__ = {**self._memory.__array_interface__, "shape": (bytes_,)}
+
+    def __del__(self) -> None:
+        with _spare_lock:
+            _spare.append(self._memory)
+            while sum(spare.nbytes for spare in _spare) > _MOST_SPARE_BYTES:
+                _spare.pop(0)
 
 
 def shared(array: np.ndarray) -> Any:

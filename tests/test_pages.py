@@ -1,0 +1,34 @@
+"""Arrays for kernels: aligned, and on memory that served before, never on memory still in use."""
+
+import gc
+
+import numpy as np
+
+from kernels import device
+
+
+def test_arrays_begin_on_cache_lines():
+    for shape in ((3,), (1000, 7), (1, 4)):
+        array = device.empty(shape, np.float32)
+        assert array.shape == shape
+        assert array.ctypes.data % 64 == 0
+
+
+def test_memory_serves_again_once_nothing_refers_to_it():
+    array = device.empty((1 << 20,), np.float64)
+    place = array.ctypes.data
+    view = array[5:9].reshape(2, 2)
+    del array
+    gc.collect()
+    assert device.empty((1 << 20,), np.float64).ctypes.data != place, "a view is left"
+    view[...] = 1.0
+    del view
+    gc.collect()
+    assert place in {device.empty((1 << 20,), np.float64).ctypes.data for _ in range(2)}
+
+
+def test_two_arrays_never_share():
+    arrays = [device.empty((4096,), np.float32) for _ in range(20)]
+    for i, array in enumerate(arrays):
+        array[...] = i
+    assert all(np.all(array == i) for i, array in enumerate(arrays))
