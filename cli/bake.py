@@ -1,4 +1,4 @@
-"""`run`, `validate` and `plan`: what a config needs, and doing it."""
+"""`run` and `plan`: what a config needs, and doing it."""
 
 import importlib
 import os
@@ -36,21 +36,7 @@ def run_command(
         _import_ahead()
         _bake_until(load_all(config_paths), until, store_root, as_json)
         return
-    _bake_all(config_paths, out, store_root, as_json, with_bundle=True)
-
-
-@click.command("validate")
-@click.argument("config_paths", metavar="CONFIG...", type=click.Path(path_type=Path), nargs=-1, required=True)
-@console.out_option
-@console.store_option
-@console.json_option
-def validate_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool) -> None:
-    """Measure CONFIGs' tables against the exact sum and write OUT/NAME/report.html.
-
-    On random directions: the relative error of |P|^2 and CIELAB errors at 1, 1000 and 7500 RU; on the maps of the
-    config's lights: CIELAB errors and pictures; and how the error depends on terms, wavelength step and grid.
-    """
-    _bake_all(config_paths, out, store_root, as_json, with_bundle=False)
+    bake_all(config_paths, out, store_root, as_json, with_bundle=True)
 
 
 def _import_ahead() -> None:
@@ -58,9 +44,10 @@ def _import_ahead() -> None:
     threading.Thread(target=importlib.import_module, args=("colour",), daemon=True).start()
 
 
-def _bake_all(
+def bake_all(
     paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, *, with_bundle: bool
 ) -> None:
+    """Every stage of CONFIGs, what people look at laid out, and what came of it told."""
     _import_ahead()
     loaded = load_all(paths)
     _require_folders(loaded, out)

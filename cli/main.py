@@ -11,7 +11,7 @@ import click
 _COMMANDS = {
     "run": "cli.bake",
     "plan": "cli.bake",
-    "validate": "cli.bake",
+    "validate": "cli.validate",
     "render": "cli.render",
     "eval": "cli.evaluate",
     "inspect": "cli.inspect",

@@ -18,6 +18,11 @@ class Check:
     measured: str
     holds: bool | None
 
+    @property
+    def verdict(self) -> str:
+        """In a word."""
+        return "told" if self.holds is None else "holds" if self.holds else "MISSES"
+
 
 @dataclass(frozen=True)
 class Table:

@@ -26,7 +26,15 @@ class Page:
     def section(self, title: str, text: str = "") -> None:
         self._parts.append(f"<h2>{html.escape(title)}</h2>")
         if text:
-            self._parts.append(f"<p>{html.escape(text)}</p>")
+            self.text(text)
+
+    def text(self, text: str) -> None:
+        self._parts.append(f"<p>{html.escape(text)}</p>")
+
+    def links(self, links: Sequence[tuple[str, str]]) -> None:
+        """Words and the addresses they lead to."""
+        each = (f'<a href="{html.escape(address)}">{html.escape(words)}</a>' for words, address in links)
+        self._parts.append(f"<p>{' '.join(each)}</p>")
 
     def warnings(self, warnings: Sequence[str]) -> None:
         self._parts += [f'<p class="warning">{html.escape(text)}</p>' for text in warnings]

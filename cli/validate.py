@@ -1,0 +1,120 @@
+"""`validate`: tables against the exact sum, or every method against what the literature and theory say."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cli import console, sources
+from cli.bake import bake_all
+
+_ROLES = ("elaphe", "xenopeltis")
+
+
+@click.command("validate")
+@click.argument("config_paths", metavar="[CONFIG]...", type=click.Path(path_type=Path), nargs=-1)
+@click.option("--bench", is_flag=True, help="The validation bench instead: pages beside the literature's figures.")
+@click.option("--quick", is_flag=True, help="Of --bench: smaller maps, fewer points.")
+@click.option(
+    "--elaphe", type=click.Path(path_type=Path), help="Of --bench: a config to stand for Elaphe [default: synthetic]."
+)
+@click.option(
+    "--xenopeltis",
+    type=click.Path(path_type=Path),
+    help="Of --bench: a config to stand for Xenopeltis [default: synthetic].",
+)
+@console.out_option
+@console.store_option
+@console.json_option
+def validate_command(
+    config_paths: tuple[Path, ...],
+    bench: bool,
+    quick: bool,
+    elaphe: Path | None,
+    xenopeltis: Path | None,
+    out: Path,
+    store_root: Path | None,
+    as_json: bool,
+) -> None:
+    """Measure CONFIGs' tables against the exact sum and write OUT/NAME/report.html.
+
+    On random directions: the relative error of |P|^2 and CIELAB errors at 1, 1000 and 7500 RU; on the maps of the
+    config's lights: CIELAB errors and pictures; and how the error depends on terms, wavelength step and grid.
+
+    With --bench and no CONFIG: every method of the literature side by side, a page for each of its figures and tables
+    with what was expected, what was measured and the verdict, in OUT/validation/index.html. It needs no file: snakes
+    are synthetic where no config of a scan is given.
+    """
+    if bench:
+        if config_paths:
+            raise click.UsageError("--bench takes no CONFIG; name scans by --elaphe and --xenopeltis")
+        _bench({"elaphe": elaphe, "xenopeltis": xenopeltis}, quick, out / "validation", store_root, as_json)
+        return
+    if quick or elaphe or xenopeltis:
+        raise click.UsageError("--quick, --elaphe and --xenopeltis belong to --bench")
+    if not config_paths:
+        raise click.UsageError("Missing argument '[CONFIG]...'; or --bench for the validation bench")
+    bake_all(config_paths, out, store_root, as_json, with_bundle=False)
+
+
+def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root: Path | None, as_json: bool) -> None:
+    from pipeline.figures import pages
+    from pipeline.figures.figure import Bench
+    from pipeline.store import writing
+
+    # better told now than after minutes of work
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    store = console.open_store(store_root)
+    surfaces = {name: _surface(name, path, store) for name, path in {"blazed": None, **roles}.items()}
+    bench = Bench(**surfaces, quick=quick)
+    with console.showing_progress() as progress:
+        made = list(pages.make_all(bench, progress, console.note))
+    written = _write(made, folder)
+    if as_json:
+        console.print_json({**pages.document(made), "files": [str(path) for path in written]})
+        return
+    console.print_table(
+        ["page", "what", "expected", "measured", "verdict"],
+        [[p.figure.name, c.what, c.expected, c.measured, c.verdict] for p in made for c in p.figure.checks],
+    )
+    click.echo(str(folder / "index.html"))
+
+
+def _surface(name: str, path: Path | None, store: Any) -> Any:
+    """A surface of the bench: a config's, or the recipe of its name."""
+    from pipeline import run
+    from pipeline.config import Config
+    from pipeline.figures.figure import Surface
+    from pipeline.stages import surface
+
+    if path is not None:
+        config = sources.load(path)
+    else:
+        config = Config.model_validate({"name": name, "surface": {"recipe": {"kind": name}}})
+    console.note(f"{config.name}:")
+    with console.showing_progress() as progress:
+        told = console.teller(config, store)
+        made = run.execute(config, run.plan(config, store, "surface"), store, progress, told)
+    field = surface.load(store.open("surface", made["surface"].key))
+    return Surface(config, field, config.surface.recipe is None)
+
+
+def _write(made: list[Any], folder: Path) -> list[Path]:
+    """index.html, a page each and validation.json, each taking its place whole."""
+    import json
+
+    from pipeline import scratch
+    from pipeline.figures import pages
+    from pipeline.report import figure_pages
+    from pipeline.store import writing
+
+    contents = {
+        "index.html": figure_pages.index(made),
+        **{f"{page.figure.name}.html": figure_pages.page(page.figure) for page in made},
+        "validation.json": json.dumps(pages.document(made), indent=1) + "\n",
+    }
+    with writing(folder), scratch.replacing(folder) as beside:
+        for name, text in contents.items():
+            (beside / name).write_text(text, encoding="utf-8")
+    return [folder / name for name in contents]

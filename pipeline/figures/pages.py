@@ -1,0 +1,64 @@
+"""The pages of the validation bench, in order, and making them all."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from typing import Any
+
+from pipeline import provenance
+from pipeline.figures.figure import Bench, Figure
+from pipeline.progress import Progress
+
+# modules of this package, each with a `make`; imported when their turn comes
+PAGES = (
+    "viewing_angles",
+    "screen",
+    "brdf_maps",
+    "grids",
+    "terms",
+    "coherence_length",
+    "wavelength_step",
+    "methods_sheet",
+    "order_efficiencies",
+    "energy",
+    "validity",
+    "costs",
+)
+
+
+@dataclass(frozen=True)
+class Made:
+    """A page and the seconds it took."""
+
+    figure: Figure
+    seconds: float
+
+
+def make_all(bench: Bench, progress: Progress, tell: Callable[[str], None]) -> Iterator[Made]:
+    """Every page, one after the other; `tell` hears of each."""
+    for name in PAGES:
+        started = time.perf_counter()
+        figure = import_module(f"pipeline.figures.{name}").make(bench, progress)
+        made = Made(figure, time.perf_counter() - started)
+        tell(f"  {name:<20} {made.seconds:5.1f} s")
+        yield made
+
+
+def document(made: Sequence[Made]) -> dict[str, Any]:
+    """All that was measured, for machines."""
+    return {
+        "versions": provenance.versions(),
+        "device": provenance.device(),
+        "pages": [
+            {
+                "name": page.figure.name,
+                "title": page.figure.title,
+                "source": page.figure.source,
+                "seconds": page.seconds,
+                "checks": [asdict(check) for check in page.figure.checks],
+                "numbers": page.figure.numbers,
+            }
+            for page in made
+        ],
+    }
