@@ -14,7 +14,7 @@ from pipeline.evaluate import table_evaluator
 from pipeline.optics import brdf, geometry
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import plan, polar, quadrature
+from pipeline.tables import plan, polar, quadrature, scattering
 
 SIGMA = 2.0
 
@@ -134,7 +134,7 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
     for angle in (0.0, 35.0, 90.0):
         along = x * np.cos(np.radians(angle)) + y * np.sin(np.radians(angle))
         field = HeightField(0.05 * np.cos(2.0 * np.pi * along / 1.2), (0.1, 0.1))
-        stretch, axis = plan.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
+        stretch, axis = scattering.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
         apart = np.angle(np.exp(2j * (axis - np.radians(angle)))) / 2.0
         assert abs(np.degrees(apart)) < 2.0
         # seams of a turned grating scatter too
@@ -144,5 +144,5 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
 def test_an_isotropic_surface_is_not_stretched() -> None:
     rng = np.random.default_rng(4)
     field = HeightField(rng.normal(0.0, 0.03, (120, 120)), (0.1, 0.1))
-    stretch, _ = plan.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
+    stretch, _ = scattering.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
     assert stretch > 0.95

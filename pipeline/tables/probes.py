@@ -1,0 +1,60 @@
+"""Directions between any table's texels, with the exact values there: what a grid leaves is measured at them."""
+
+import numpy as np
+
+from kernels import polar as device
+from pipeline import spectrum
+from pipeline.config import Material, Scene
+from pipeline.directions import random_pairs
+from pipeline.optics import brdf, geometry
+from pipeline.optics.colour_error import delta_e
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import trapezoid
+from pipeline.tables import polar
+from pipeline.tables.ingredients import Ingredients
+from pipeline.tables.scattering import probing_angles
+
+_RHOS, _ANGLES = 48, 64
+_SPARE_W_TERMS = 8
+_SEED = 19991
+
+
+class Probes:
+    """Exact means: from E at the probes' own rings and azimuths, with spare terms in |w|."""
+
+    def __init__(self, of: Ingredients, scene: Scene | None, rho_max: float, exposure_ru: float) -> None:
+        half, counts = probing_angles(of.stack, _ANGLES, np.random.default_rng(_SEED))
+        # angles of half a turn serve its other half as well
+        angles = np.concatenate([half, half + np.pi])
+        wi, wr = random_pairs(scene, _RHOS * len(angles), _SEED)
+        uvw = geometry.uvw(wi, wr)
+        order = np.argsort(np.hypot(uvw[:, 0], uvw[:, 1])).reshape(_RHOS, len(angles))
+        # the pairs of a ring share its radius and keep their own w
+        rho = np.minimum(np.median(np.hypot(uvw[order, 0], uvw[order, 1]), axis=1), rho_max)
+        w = uvw[order, 2]
+        along_x, along_y = np.outer(rho, np.cos(angles)), np.outer(rho, np.sin(angles))
+        self._uvw = np.stack([along_x, along_y, w], axis=-1).reshape(-1, 3)
+        factor = brdf.direction_factor(Material(), trapezoid(of.light, 1.0), wi[order], wr[order])
+        self._factor = factor.reshape(-1, 1)
+        self._exact = _exact(of, half, rho, w).reshape(-1, 3)
+        self._counts = np.broadcast_to(np.tile(counts, 2), factor.shape).ravel()
+        self._exposure_ru = exposure_ru
+
+    def error(self, table: polar.PolarTable) -> float:
+        """Mean CIELAB error of a table."""
+        found = np.nan_to_num(polar.look_up(table, self._uvw))
+        error = delta_e(self._factor * found, self._factor * self._exact, self._exposure_ru)
+        return float(np.average(error, weights=self._counts))
+
+
+def _exact(of: Ingredients, half_turn: Array, rho: Array, w: Array) -> Array:
+    """XYZ / (C cos ti) (rhos, angles, 3) on rings `rho` at both half turns' angles, for `w` (rhos, angles)."""
+    found = spectrum.gather(of.stack, half_turn, of.radius_per_um, of.lambda_min_nm, of.s_nodes)
+    rules = of.rules(rho)
+    reflected = polar.at_nodes(polar.grey, rho, rules, of.w_terms + _SPARE_W_TERMS)
+    s_max = spectrum.s_max(of.lambda_min_nm)
+    terms = device.integrate(found, of.radius_per_um, s_max, rho, rules, reflected)
+    terms = terms.reshape(len(rho), 3, -1, w.shape[1])
+    x = polar.w_position(rho[:, None], w)
+    cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
+    return np.asarray(np.einsum("rcka,rak->rac", terms, cosines))
