@@ -85,7 +85,10 @@ def integrate(
 
 
 class Reference:
-    """|P|^2 and XYZ of one height field for any directions, exact to 1e-9 of the mirror."""
+    """|P|^2 and XYZ of one height field for any directions, exact to 1e-9 of the mirror.
+
+    stored_bytes: of the DFT of every term, which each answer gathers from.
+    """
 
     def __init__(
         self, field: HeightField, sigma_um: float, lambda_min_nm: float, progress: Progress = silent
@@ -96,6 +99,7 @@ class Reference:
         built = stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
         self._sigma_um = sigma_um
         self._stack = upload(built)
+        self.stored_bytes = built.coefficients.nbytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
