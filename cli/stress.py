@@ -28,13 +28,14 @@ def stress_command(quick: bool, out: Path, as_json: bool) -> None:
     A cell is ok where its error is within what its method promises, or refused with a reason. Exit code 4 where
     any is neither.
     """
-    from pipeline import scratch, stress
+    from pipeline import scratch
     from pipeline.errors import AccuracyError
     from pipeline.report import stress_plots
+    from pipeline.stress import judging, sweep
 
     with console.showing_progress() as progress:
-        outcomes = stress.sweep(stress.cells(quick), progress)
-    criterion = stress.criterion(outcomes)
+        outcomes = judging.sweep(sweep.cells(quick), progress)
+    criterion = judging.criterion(outcomes)
     cells = [asdict(outcome) for outcome in outcomes]
     document = {"cells": cells, "criterion": asdict(criterion)}
     with scratch.replacing(out) as folder:

@@ -33,8 +33,8 @@ def index(made: Sequence[Made]) -> str:
     holding = sum(check.holds is True for check in judged)
     found = Page(
         "Validation bench",
-        f"{holding} of {len(judged)} statements hold; {len(checks) - len(judged)} more are told beside published values. "
-        f"{sum(one.seconds for one in made):.0f} s in all.",
+        f"{holding} of {len(judged)} statements hold, {len(checks) - len(judged)} are told beside published values"
+        f". {sum(one.seconds for one in made):.0f} s in all.",
     )
     for one in made:
         figure = one.figure

@@ -6,7 +6,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from pipeline.report.plots import png
-from pipeline.stress import CHEBYSHEV_TOLERANCE, Outcome
+from pipeline.stress.judging import CHEBYSHEV_TOLERANCE, Outcome
 
 _CURVES = (
     ("taylor", "float32", "Taylor, float32", "#ca6702"),

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import stress
 from pipeline.errors import AccuracyError
+from pipeline.stress import judging, sweep
+from pipeline.stress.cell import Cell
 from tests.cli.tool import Tool, too_wide
 
-_NOISE = stress.Cell("height", "series", "chebyshev", "float32", "noise", 10.0, (40, 48), (0.1, 0.12), 1.2)
+_NOISE = Cell("height", "series", "chebyshev", "float32", "noise", 10.0, (40, 48), (0.1, 0.12), 1.2)
 CELLS = [
     _NOISE,
     replace(_NOISE, basis="taylor", precision="float64", height_um=2.0),
@@ -21,7 +22,7 @@ CELLS = [
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stress, "cells", lambda quick: CELLS[:2] if quick else CELLS)
+    monkeypatch.setattr(sweep, "cells", lambda quick: CELLS[:2] if quick else CELLS)
 
 
 @pytest.mark.usefixtures("few")
@@ -58,7 +59,7 @@ def test_quick_is_a_part(tool: Tool) -> None:
 
 @pytest.mark.usefixtures("few")
 def test_a_wrong_cell_is_told_and_ends_in_code_4(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stress, "CHEBYSHEV_TOLERANCE", 1e-9)
+    monkeypatch.setattr(judging, "CHEBYSHEV_TOLERANCE", 1e-9)
     result = tool("stress")
     assert result.code == AccuracyError.exit_code
     assert len(result.errors) == 1
@@ -70,7 +71,7 @@ def test_a_wrong_cell_is_told_and_ends_in_code_4(tool: Tool, monkeypatch: pytest
 
 def test_a_criterion_not_met_ends_in_code_4(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     low = [CELLS[0], replace(CELLS[1], height_um=2.0, kind="flat")]
-    monkeypatch.setattr(stress, "cells", lambda _quick: low)
+    monkeypatch.setattr(sweep, "cells", lambda _quick: low)
     result = tool("stress")
     assert result.code == AccuracyError.exit_code
     assert "Taylor float64 has failed" in result.errors[0]
