@@ -57,7 +57,7 @@ def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, or
     """
     z = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
     # two fifths of the budget for the truncation, which enters twice; the rounding is what it is
-    chosen = order if order is not None else _taylor_order(z, 0.2 * tolerance)
+    chosen = order if order is not None else taylor_order(z, 0.2 * tolerance)
     plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
     if plan.error > tolerance:
         raise AccuracyError(_refusal(plan, field, tolerance, order is not None))
@@ -79,7 +79,7 @@ def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float, order_was_g
     return text + "Lower the heights (a scan's outliers: surface.clip_percentile); no tolerance helps."
 
 
-def _taylor_order(z: float, tolerance: float) -> int:
+def taylor_order(z: float, tolerance: float) -> int:
     """Smallest N whose remainder is below `tolerance`."""
     for order in range(1, _MOST_TERMS):
         if _taylor_remainder(z, order) <= tolerance:
