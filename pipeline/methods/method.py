@@ -5,9 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
 from pipeline.config import Config
+from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.spectra import Quadrature, trapezoid
 from pipeline.reference import integrate
 from pipeline.surface.heightfield import HeightField
 
@@ -66,3 +69,19 @@ def integrated(
     quadrature = trapezoid(config.spectrum, step_nm)
     values = power(-wi - wr, quadrature.lambda_nm)
     return integrate(values, quadrature, config.material, config.coherence.sigma_um, wi, wr)
+
+
+def monochromatic_brdf(method: Monochromatic, config: Config, wi: Array, wr: Array, lambda_nm: Array) -> Array:
+    """f_l (directions, L) at single wavelengths in the config's normalisation ([D14] eq. 2 or 4).
+
+    In 1/sr for `absolute`. What lies beyond the scan's band is NaN.
+    """
+    material, light = config.material, trapezoid(config.spectrum, PUBLISHED_STEP_NM)
+    single = Quadrature(lambda_nm, np.ones((len(lambda_nm), 3)))
+    inside = brdf.spectral_reflectance(material, config.spectrum, lambda_nm, geometry.cos_half(wi, wr))
+    inside = inside * brdf.window_area(material, single, config.coherence.sigma_um)
+    if material.fresnel == "conductor":
+        outside = brdf.geometry_factor(material, wi, wr)
+    else:
+        outside = brdf.direction_factor(material, light, wi, wr)
+    return np.asarray((outside / wi[:, 2])[:, None] * inside * method.power(geometry.uvw(wi, wr), lambda_nm))
