@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels import device
 
-_LANES = 8  # doubles in one vector of the kernels
+LANES = 8  # doubles in one vector of the kernels
 _VECTOR_BYTES = 64  # a double8 or a float16
 _TILE = 4096  # nodes or directions in one launch: bounds memory and paces progress
 _GRID = np.dtype(
@@ -78,7 +78,7 @@ def taylor_table(
     I_p(-u, -v) = (-1)^p I_p(u, v).
     """
     powers = 2 * stack.constants["TERMS"] - 1
-    width = 2 * _LANES * stack.constants["BLOCKS"]
+    width = 2 * LANES * stack.constants["BLOCKS"]
     program = device.program(("windowed_dft.cl", "taylor_table.cl"), stack.constants)
     series = _taylor_series(lambda_um, stack.half_range_um, stack.constants)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, fourth_column(weights)))
@@ -108,11 +108,11 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
     `uvw` (directions, 3), `lambda_um` (L,). One launch: callers choose how many directions they hold at once.
     """
     program = device.program(("windowed_dft.cl", "power_spectrum.cl"), stack.constants)
-    groups = -(-len(lambda_um) // _LANES)
-    padded = np.full(groups * _LANES, lambda_um[-1])
+    groups = -(-len(lambda_um) // LANES)
+    padded = np.full(groups * LANES, lambda_um[-1])
     padded[: len(lambda_um)] = lambda_um
     directions, wavelengths = device.upload(fourth_column(uvw)), device.upload(padded)
-    out = np.empty((len(uvw), groups * _LANES))
+    out = np.empty((len(uvw), groups * LANES))
     result = device.result_buffer(out.nbytes)
     program.launch(
         "power_spectrum",
@@ -134,7 +134,7 @@ def _taylor_series(lambda_um: np.ndarray, half_range_um: float, constants: dict[
     phase = 2.0 * np.pi / lambda_um[:, None] * half_range_um
     n = np.arange(1, constants["TERMS"])
     factors = np.cumprod(np.concatenate([np.ones((len(lambda_um), 1), complex), 1j * phase / n], axis=1), axis=1)
-    series = np.zeros((len(lambda_um), 2, _LANES * constants["BLOCKS"]))
+    series = np.zeros((len(lambda_um), 2, LANES * constants["BLOCKS"]))
     series[:, 0, : constants["TERMS"]] = factors.real
     series[:, 1, : constants["TERMS"]] = factors.imag
     return series

@@ -94,7 +94,9 @@ class Reference:
         self, field: HeightField, sigma_um: float, lambda_min_nm: float, progress: Progress = silent
     ) -> None:
         z = series.largest_phase(field.half_range_um, lambda_min_nm)
-        terms = series.chebyshev_order(z, _TOLERANCE) + 1
+        # whole vectors of terms cost the same and are shared with the device without a copy
+        lanes = diffraction.LANES
+        terms = lanes * -(-(series.chebyshev_order(z, _TOLERANCE) + 1) // lanes)
         reachable = series.W_MAX / (1e-3 * lambda_min_nm)
         built = stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
         self._sigma_um = sigma_um

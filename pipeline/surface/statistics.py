@@ -212,7 +212,7 @@ def _spectrum(field: HeightField, highest_per_um: float) -> _Spectrum:
     ny, nx = field.shape
     window = _window(ny)[:, None] * _window(nx)
     heights = field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))
-    power = np.abs(fft.fftshift(fft.fft2(heights * window))) ** 2
+    power = np.abs(fft.fftshift(fft.fft2(heights * window, workers=-1))) ** 2
     power /= power.size * float(np.sum(window**2))
     # rounding of a flat field is no structure
     peak = float(np.max(np.abs(field.heights_um)))
@@ -262,7 +262,8 @@ def _smooth(spectrum: _Spectrum, width_x: float, width_y: float) -> Array:
     my, mx = spectrum.power.shape
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
     gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * fft.fftfreq(my)) ** 2)
-    smooth: Array = fft.irfft2(fft.rfft2(spectrum.power) * gain_y[:, None] * gain_x, s=(my, mx))
+    transform = fft.rfft2(spectrum.power, workers=-1)
+    smooth: Array = fft.irfft2(transform * gain_y[:, None] * gain_x, s=(my, mx), workers=-1)
     return smooth
 
 
