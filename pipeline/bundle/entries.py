@@ -4,14 +4,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipeline.bundle.manifest import Colour, Coverage, MadeBy, Provenance
-from pipeline.config import Config, TaylorLayout
+from pipeline.bundle.manifest import Colour, Coverage, Domain, MadeBy, Provenance
+from pipeline.config import Config, LaserLine, TaylorLayout
 from pipeline.digest import of_file
+from pipeline.optics import validity
 from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.store import Artifact
 from pipeline.tables import grid
 
 _NOT_RECORDED = "not recorded"
+_LUMINOUS_NM = 550.0
 _LIBRARIES = ("numpy", "pyopencl", "zarr", "OpenEXR")
 
 CONVENTIONS = {
@@ -60,6 +62,23 @@ def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
         skipped_share=table["skipped_share"],
         known_radius=min(grid.U_MAX, known),
         band_limit_per_um=list(band),
+    )
+
+
+def domain(config: Config, inputs: Mapping[str, Artifact]) -> Domain:
+    """Where the surface lies in the scalar model's domain, at the light's line or the eye's middle wavelength."""
+    illuminant = config.spectrum.illuminant
+    lambda_nm = illuminant.lambda_nm if isinstance(illuminant, LaserLine) else _LUMINOUS_NM
+    statistics = inputs["surface"].summary["statistics"]
+    periods = [period["period_um"] for period in statistics["periods"]]
+    found = validity.place(min(periods), statistics["sigma_h_um"], lambda_nm) if periods else None
+    return Domain(
+        lambda_nm=lambda_nm,
+        period_over_lambda=None if found is None else found.period,
+        error_of_smooth=None if found is None else found.smooth,
+        error_of_edged=None if found is None else found.edged,
+        tolerated=validity.TOLERATED,
+        within=None if found is None else found.within,
     )
 
 

@@ -12,7 +12,7 @@ from pipeline.bundle.material import MaterialEntry
 from pipeline.config import Section
 
 MANIFEST = "manifest.json"
-SCHEMA_VERSION: Literal[2] = 2
+SCHEMA_VERSION: Literal[3] = 3
 Normal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 # --- images --------------------------------------------------------------------------------------------
@@ -236,6 +236,23 @@ class Coverage(Section):
     band_limit_per_um: list[float]
 
 
+class Domain(Section):
+    """How far the scalar model itself can be trusted here: its largest errors against rigorous coupled waves.
+
+    Of an order's efficiency, a share of what the flat surface reflects: of a sinusoid and of a blaze with the
+    surface's finest significant period and rms height, at a wavelength. None of periods too fine or reliefs too deep
+    for what was compared; all None of a surface without a period.
+    """
+
+    model: str = "scalar: one reflection, no polarisation, no shadows but the V-cavity's"
+    lambda_nm: float
+    period_over_lambda: float | None
+    error_of_smooth: float | None
+    error_of_edged: float | None
+    tolerated: float
+    within: bool | None
+
+
 class MadeBy(Section):
     diffract_bake: str
     stages: dict[str, int]
@@ -254,7 +271,7 @@ class Provenance(Section):
 class Manifest(Section):
     """manifest.json, whole."""
 
-    schema_version: Literal[2]
+    schema_version: Literal[3]
     name: str
     version: str
     licence: str
@@ -270,6 +287,7 @@ class Manifest(Section):
     maps: list[MapImage]
     report: str | None
     coverage: Coverage
+    domain: Domain
     plan: dict[str, Any]
     certificate: CertificateEntry | None
     measured_error: dict[str, Any]

@@ -117,6 +117,7 @@ def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progres
         maps=maps,
         report=REPORT if report.is_file() else None,
         coverage=entries.coverage(config, inputs),
+        domain=entries.domain(config, inputs),
         plan=table.plan,
         certificate=table.certificate,
         measured_error=inputs["validate"].summary,

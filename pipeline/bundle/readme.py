@@ -1,6 +1,6 @@
 """README.md of a bundle: what a person who writes a shader needs, with this bundle's numbers."""
 
-from pipeline.bundle.manifest import CertificateEntry, Manifest, PolarLoss, StorageLoss
+from pipeline.bundle.manifest import CertificateEntry, Domain, Manifest, PolarLoss, StorageLoss
 from pipeline.bundle.material import MaterialEntry
 
 _TEXT = """\
@@ -17,7 +17,9 @@ Licence of the scan: {licence}.
 {optional}| `maps/` | BRDF maps: EXR (`brdf.X`, `brdf.Y`, `brdf.Z` at 1 RU) and PNG previews |
 | `SHA256SUMS` | digests of all files; its own digest begins with the 12 digits that end the folder's name |
 
-{errors}## In a shader
+{errors}{domain}
+
+## In a shader
 
 Directions `wi` (light) and `wr` (view) are unit vectors away from the surface in its tangent frame: z the
 normal, x and y the scan's axes, y up. {space}.
@@ -60,6 +62,7 @@ def text(manifest: Manifest, files: str, shader: str) -> str:
         files=files,
         optional=_optional(manifest.report, material),
         errors=_errors(manifest),
+        domain=_domain(manifest.domain),
         space=f"Colours are {manifest.colour.space}",
         shader=shader,
         formula=material.formula,
@@ -68,6 +71,26 @@ def text(manifest: Manifest, files: str, shader: str) -> str:
         divisor=material.divisor,
         exponent=material.exponent,
         f0="" if material.schlick_f0 is None else f", F0 = {material.schlick_f0!r}",
+    )
+
+
+def _domain(domain: Domain) -> str:
+    """Where the scalar model holds, and where this surface lies."""
+    text = (
+        "The model is scalar: it was held against rigorous coupled waves, and errs by more than "
+        f"{100 * domain.tolerated:.0f} % of the\nreflected light where periods are fine or edges deep (`domain` in "
+        "the manifest). "
+    )
+    if domain.period_over_lambda is None:
+        return text + "This surface has no period to compare by."
+    told = [
+        f"as one with {kind} {'beyond what was compared' if error is None else f'to {100 * error:.0f} %'}"
+        for kind, error in (("smooth slopes", domain.error_of_smooth), ("edges", domain.error_of_edged))
+    ]
+    return text + (
+        f"This surface's finest period is\n{domain.period_over_lambda:.1f} wavelengths of {domain.lambda_nm:g} nm: "
+        + ", ".join(told)
+        + "."
     )
 
 

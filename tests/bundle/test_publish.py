@@ -17,6 +17,7 @@ from pipeline.bundle.manifest import Manifest, TaylorGrid
 from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
+from pipeline.optics import validity
 from pipeline.stages import taylor_table
 from pipeline.tables import grid
 
@@ -82,6 +83,16 @@ def test_the_manifest_tells_errors_coverage_and_origin(bake: Baker, bundle: Path
     assert (told.made_by.device, told.made_by.driver) == ("a device", "1.0")
     assert told.made_by.libraries["zarr"] == "not recorded"
     assert told.licence == "not stated"
+
+
+def test_the_scalar_models_domain_is_told(bake: Baker, bundle: Path) -> None:
+    told, statistics = manifest_of(bundle).domain, bake(small())["surface"].summary["statistics"]
+    finest = min(period["period_um"] for period in statistics["periods"])
+    assert told.lambda_nm == 550.0
+    assert told.period_over_lambda == pytest.approx(finest / 0.55)
+    found = validity.place(finest, statistics["sigma_h_um"], 550.0)
+    assert (told.error_of_smooth, told.error_of_edged, told.within) == (found.smooth, found.edged, found.within)
+    assert "The model is scalar." in (bundle / "README.md").read_text(encoding="utf-8")
 
 
 def test_a_licence_is_told(bake: Baker, tmp_path: Path) -> None:

@@ -133,8 +133,8 @@ def test_sums_that_are_no_text(bundle: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "fault"),
     [
-        ('"schema_version": 2', '"schema_version": 1', "schema_version"),
-        ('"schema_version": 2', '"schema_version": 2, "more": 0', "more"),
+        ('"schema_version": 3', '"schema_version": 1', "schema_version"),
+        ('"schema_version": 3', '"schema_version": 3, "more": 0', "more"),
         ('"file": "tables/I_00.exr"', '"file": "../I_00.exr"', "tables.0.taylor.file"),
         ('"file": "tables/I_00.exr"', '"file": "tables/none.exr"', "names tables/none.exr, which is missing"),
         ('"version": "1.0.0"', '"version": "1.0.1"', "is of small-1.0.1"),
