@@ -92,7 +92,7 @@ def test_the_scalar_models_domain_is_told(bake: Baker, bundle: Path) -> None:
     assert told.period_over_lambda == pytest.approx(finest / 0.55)
     found = validity.place(finest, statistics["sigma_h_um"], 550.0)
     assert (told.error_of_smooth, told.error_of_edged, told.within) == (found.smooth, found.edged, found.within)
-    assert "The model is scalar." in (bundle / "README.md").read_text(encoding="utf-8")
+    assert "The model is scalar" in (bundle / "README.md").read_text(encoding="utf-8")
 
 
 def test_a_licence_is_told(bake: Baker, tmp_path: Path) -> None:
