@@ -7,12 +7,13 @@ BAKE := $(VENV)/bin/diffract-bake
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench test lint clean
+.PHONY: help setup bake pipeline bench validation test lint clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
 	@echo "make pipeline CONFIG=...     set up, then bake any config (several: CONFIG=\"a.toml b.toml\")"
 	@echo "make bench                   run time against error of every way to a table: table, plots, verdicts"
+	@echo "make validation              every method beside the literature's figures and theory: a page each, verdicts"
 	@echo "make test                    set up, then run linters and every test"
 	@echo "make lint                    ruff and mypy alone"
 	@echo "make setup                   only the set-up"
@@ -55,10 +56,14 @@ pipeline: has-config setup
 has-config:
 	@test -n "$(CONFIG)" || { echo "error: name a config: make pipeline CONFIG=configs/blazed.toml" >&2; exit 2; }
 
-# the real scans where they are beside the checkout; without a config, bench takes three synthetic surfaces
+# the real scans where they are beside the checkout; without a config, bench and validation take synthetic surfaces
 SCANS := $(if $(wildcard ../shared/data/snakes),tests/scans/elaphe_scan.toml tests/scans/xenopeltis_scan.toml configs/blazed.toml)
 bench: setup
 	$(BAKE) bench $(SCANS) --out $(OUT)/bench
+
+VALIDATED := $(if $(wildcard ../shared/data/snakes),--elaphe tests/scans/elaphe_scan.toml --xenopeltis tests/scans/xenopeltis_scan.toml)
+validation: setup
+	$(BAKE) validate --bench $(VALIDATED) --out $(OUT)
 
 lint: $(VENV)/ready
 	$(VENV)/bin/ruff check .

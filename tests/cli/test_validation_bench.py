@@ -1,0 +1,103 @@
+"""`validate --bench`: what it prints and writes, with pages made here; README's test runs the real ones."""
+
+import json
+from html.parser import HTMLParser
+
+import pytest
+
+from pipeline.figures import pages
+from pipeline.figures.figure import Bench, Check, Figure, Picture, Table
+from pipeline.report.plots import png
+from tests.cli.tool import REPOSITORY, Tool
+
+
+class Links(HTMLParser):
+    """The addresses that a page leads to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "a":
+            self.found += [value for name, value in attrs if name == "href" and value]
+
+
+def picture() -> bytes:
+    from matplotlib.figure import Figure as Drawing
+
+    drawing = Drawing(figsize=(1, 1))
+    drawing.subplots().plot([0, 1], [0, 1])
+    return png(drawing)
+
+
+def first(bench: Bench, _progress: object) -> Figure:
+    checks = [
+        Check("samples", "> 0", str(bench.elaphe.field.shape), bench.elaphe.field.heights_um.size > 0),
+        Check("a <tag> & more", "1", "2", False),
+        Check("published", "39", "40", None),
+    ]
+    table = Table("Rows", ("a", "b"), [("1", "2")])
+    return Figure("first", "First", "[D14] fig. 1", "all well", checks, [table], [Picture(picture(), "a line")])
+
+
+@pytest.fixture
+def one_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages, "PAGES", ("first",))
+
+    class Module:
+        make = staticmethod(first)
+
+    monkeypatch.setattr(pages, "import_module", lambda _name: Module)
+
+
+@pytest.mark.usefixtures("one_page")
+def test_it_writes_a_page_a_figure_and_tells_verdicts(tool: Tool) -> None:
+    result = tool("validate", "--bench", "--quick")
+    assert result.code == 0, result.stderr
+    folder = tool.out / "validation"
+    assert sorted(path.name for path in folder.iterdir()) == ["first.html", "index.html", "validation.json"]
+    index, page = ((folder / name).read_text(encoding="utf-8") for name in ("index.html", "first.html"))
+    assert "1 of 2 statements hold, 1 are told beside published values" in index
+    for text in (index, page):
+        links = Links()
+        links.feed(text)
+        assert links.found
+        assert all((folder / address).is_file() for address in links.found)
+        assert "a &lt;tag&gt; &amp; more" in text
+    assert "data:image/png;base64," in page
+    rows = [line.split() for line in result.stdout.splitlines()]
+    assert [row[-1] for row in rows[1:4]] == ["holds", "MISSES", "told"]
+    document = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
+    assert [check["holds"] for check in document["pages"][0]["checks"]] == [True, False, None]
+
+
+@pytest.mark.usefixtures("one_page")
+def test_machines_get_one_document(tool: Tool) -> None:
+    result = tool("validate", "--bench", "--json")
+    assert result.json["pages"][0]["name"] == "first"
+    assert all((tool.folder / path).is_file() for path in result.json["files"])
+
+
+@pytest.mark.usefixtures("one_page")
+def test_a_config_stands_for_a_snake(tool: Tool) -> None:
+    config = tool.config("mine.toml", name="mine")
+    result = tool("validate", "--bench", "--elaphe", config)
+    assert result.code == 0, result.stderr
+    assert "(100, 100)" in result.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--bench", "small.toml"], ["--quick", "small.toml"], [], ["--elaphe", "small.toml", "small.toml"]]
+)
+def test_what_does_not_go_together_is_refused(tool: Tool, arguments: list[str]) -> None:
+    tool.config()
+    result = tool("validate", *arguments)
+    assert result.code == 2
+    assert "--bench" in result.stderr
+
+
+def test_every_page_is_there() -> None:
+    folder = REPOSITORY / "pipeline" / "figures"
+    with_make = {path.stem for path in folder.glob("*.py") if "\ndef make(" in path.read_text(encoding="utf-8")}
+    assert with_make == set(pages.PAGES)
