@@ -125,6 +125,15 @@ def test_wavelengths_follow_the_radius() -> None:
         assert np.sqrt(np.mean(np.abs(error) ** 2)) < 2.0 * tolerance
 
 
+def test_every_ring_keeps_the_white() -> None:
+    """20 nm alone would miss a hundredth of Z's whole integral, in the mirror direction above all."""
+    light = partial(lambda step: brdf.integrand(Material(), LIGHT, step, 16.25))
+    rules = quadrature.choose(light, Rings(40, 0.1).rho(), 16.25, 1e-3)
+    white = light(0.05).weights.sum(axis=0)
+    for first, count in zip(rules.first, rules.count, strict=True):
+        np.testing.assert_allclose(rules.weights[first : first + count].sum(axis=0), white, rtol=1e-4)
+
+
 def test_a_laser_line_needs_one_wavelength() -> None:
     light = Spectrum(illuminant=LaserLine(lambda_nm=532.0))
     rules = quadrature.choose(
