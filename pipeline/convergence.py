@@ -12,7 +12,7 @@ from pipeline.evaluate import Evaluator, Map, relative_unit, table_evaluator
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.spectra import trapezoid
 from pipeline.reference import STEP_NM, MeanReference
 from pipeline.spectrum import PolarSpectrum
 from pipeline.tables import plan, polar, quadrature, taylor
@@ -50,14 +50,6 @@ class CoarseMap:
         """Mean CIELAB error of an evaluator."""
         xyz, exposure = evaluate(self.wi, self.wr), self.config.accuracy.exposure_ru
         return float(np.mean(delta_e(xyz / self._unit, self._truth / self._unit, exposure)))
-
-
-def _integrand(config: Config, step_nm: float) -> Quadrature:
-    return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
-
-
-def _illumination(config: Config, step_nm: float) -> Quadrature:
-    return brdf.illumination(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
 class TaylorStudy:
@@ -104,7 +96,7 @@ class TaylorStudy:
         return Curve(f"exponent a at {size} nodes", "", powers, errors, self._layout.power)
 
     def _on_grid(self, size: int, power: float) -> float:
-        rule = _integrand(self._config, self._layout.step_nm)
+        rule = brdf.integrand_of(self._config)(self._layout.step_nm)
         table = taylor.build(self._stack, rule, size, power, self._config.scene)
         return self._views.error(table_evaluator(table, self._config))
 
@@ -116,7 +108,7 @@ class TaylorStudy:
         def evaluate(wi: Array, wr: Array) -> Array:
             uvw = geometry.uvw(wi, wr)
             turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
-            i_p = taylor.node_values(fewer, _integrand(self._config, step_nm), turn[:, None] * uvw[:, :2])
+            i_p = taylor.node_values(fewer, brdf.integrand_of(self._config)(step_nm), turn[:, None] * uvw[:, :2])
             # I_p(-u, -v) = (-1)^p I_p(u, v), so w takes the turn's sign
             summed = taylor.sum_powers(i_p, turn * uvw[:, 2])
             return brdf.direction_factor(self._config.material, plain, wi, wr)[:, None] * summed
@@ -161,16 +153,15 @@ class PolarStudy:
         """Mean error against one wavelength step for all rings; marked is the mean of the steps chosen."""
         light, rho = self._config.spectrum, self._plan.rings.rho()
         steps = [1.0, 2.0, 5.0, 10.0, 20.0]
-        errors = [
-            self._error(self._plan, rules=quadrature.uniform(_illumination(self._config, s), len(rho))) for s in steps
-        ]
+        light_of = brdf.illumination_of(self._config)
+        errors = [self._error(self._plan, rules=quadrature.uniform(light_of(s), len(rho))) for s in steps]
         low, high = light.range_nm
         chosen = (high - low) / (float(np.mean(self._rules(rho).count)) - 1.0)
         return Curve("wavelength step", "nm", steps, errors, round(chosen, 2))
 
     def _rules(self, rho: Array) -> RingQuadratures:
         tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
-        return quadrature.choose(partial(_illumination, self._config), rho, self._spectrum.sigma_um, tolerance)
+        return quadrature.choose(brdf.illumination_of(self._config), rho, self._spectrum.sigma_um, tolerance)
 
     def _error(
         self,

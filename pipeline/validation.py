@@ -13,7 +13,7 @@ from pipeline.evaluate import Evaluator, Map, relative_unit
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import ColourError, colour_errors, delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.reference import MeanReference, Reference, power_direct
 from pipeline.surface.heightfield import HeightField
@@ -43,14 +43,10 @@ def relative_error(values: Array, reference: Array, floor: float) -> RelativeErr
     return RelativeError(float(np.median(error)), float(np.percentile(error, 99)), float(error.max()))
 
 
-def _integrand(config: Config, step_nm: float) -> Quadrature:
-    return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
-
-
 def mirror_luminance(config: Config, wi: Array, wr: Array) -> Array:
     """Y (directions,) that |P|^2 = 1 at every wavelength would give at these directions."""
     plain = trapezoid(config.spectrum, config.mean_step_nm)
-    inside = _integrand(config, config.mean_step_nm).weights[:, 1].sum()
+    inside = brdf.integrand_of(config)(config.mean_step_nm).weights[:, 1].sum()
     return brdf.direction_factor(config.material, plain, wi, wr) * float(inside)
 
 

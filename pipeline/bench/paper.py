@@ -80,7 +80,7 @@ class Paper:
 
     def _quadrature(self, step_nm: float) -> Quadrature:
         config = self._config
-        return brdf.integrand(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
+        return brdf.integrand_of(config)(step_nm)
 
 
 def _some_nodes(count: int) -> Array:

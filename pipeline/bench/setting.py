@@ -80,8 +80,8 @@ class Setting:
         return self.rules_of(self.light)
 
     def rules_of(self, light: Spectrum) -> RingQuadratures:
-        integrand = partial(_integrand, self.config, light)
-        return quadrature.choose(integrand, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
+        lit = partial(brdf.illumination, self.config.material, light, self.sigma_um)
+        return quadrature.choose(lit, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
 
     def table(self, made: PolarSpectrum, light: Spectrum) -> polar.PolarTable:
         reflectance = partial(brdf.spectral_reflectance, self.config.material, light)
@@ -123,10 +123,6 @@ class Setting:
         amplitudes = np.where(n == 0, 1.0, 2.0) * (-1j) ** n * jv(n, phase[..., None])
         first = int(np.sum(self.rules.count[:ring]))
         return np.asarray(amplitudes * np.sqrt(self._reflectance[first : first + len(phase), :, None]))
-
-
-def _integrand(config: Config, light: Spectrum, step_nm: float) -> Quadrature:
-    return brdf.illumination(config.material, light, step_nm, config.coherence.sigma_um)
 
 
 def first_bake(field: HeightField, config: Config, layout: PolarLayout) -> tuple[PolarSpectrum, Setting]:

@@ -27,7 +27,7 @@ class PaperLookUp:
         tolerance: float = TOLERANCE,
     ) -> None:
         """Raises AccuracyError where float32 tables would lose their digits, or not fit."""
-        rule = brdf.integrand(config.material, config.spectrum, PUBLISHED_STEP_NM, config.coherence.sigma_um)
+        rule = brdf.integrand_of(config)(PUBLISHED_STEP_NM)
         self._table = taylor.build(taylor_stack(field, config, tolerance), rule, resolution, power)
         self._look_up = table_evaluator(self._table, config)
 

@@ -8,7 +8,6 @@ from pipeline.config import Config, PolarLayout
 from pipeline.evaluate import table_evaluator
 from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
 from pipeline.reference import in_band
 from pipeline.spectrum import PolarSpectrum
 from pipeline.stack import crop_to_window
@@ -72,11 +71,8 @@ class PolarTableMethod:
         )
 
     def _integrated(self, made: PolarSpectrum, chosen: Plan) -> PolarTable:
-        config, sigma_um = self._config, self._config.coherence.sigma_um
-
-        def light(step_nm: float) -> Quadrature:
-            return brdf.illumination(config.material, config.spectrum, step_nm, sigma_um)
-
-        rules = quadrature.choose(light, chosen.rings.rho(), sigma_um, self._budget.quadrature)
+        config, rho = self._config, chosen.rings.rho()
+        light, sigma_um = brdf.illumination_of(config), config.coherence.sigma_um
+        rules = quadrature.choose(light, rho, sigma_um, self._budget.quadrature)
         reflectance = partial(brdf.spectral_reflectance, config.material, config.spectrum)
         return polar.build(made, chosen.rings, rules, chosen.w_terms, reflectance)

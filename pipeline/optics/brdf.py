@@ -5,11 +5,13 @@ The reflected radiance under unit irradiance is `direction_factor * sum_l spectr
 unless a metal's reflectance depends on wavelength and angle together; `metal_reflectance` is that exact case.
 """
 
+from collections.abc import Callable
+from functools import partial
 from math import pi
 
 import numpy as np
 
-from pipeline.config import FINE_STEP_NM, Material, Spectrum
+from pipeline.config import FINE_STEP_NM, Config, Material, Spectrum
 from pipeline.optics import fresnel, geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature, trapezoid
@@ -40,11 +42,21 @@ def geometry_factor(material: Material, wi: Array, wr: Array) -> Array:
     return factor * geometry.v_cavity(wi, wr) if material.shadowing else factor
 
 
-def illumination(material: Material, spectrum: Spectrum, step_nm: float, sigma_um: float) -> Quadrature:
+def illumination(material: Material, spectrum: Spectrum, sigma_um: float, step_nm: float) -> Quadrature:
     """Light, observer and the window's area, as one quadrature for R |P|^2."""
     quadrature = trapezoid(spectrum, step_nm)
     area = window_area(material, quadrature, sigma_um)
     return Quadrature(quadrature.lambda_nm, quadrature.weights * area[:, None])
+
+
+def illumination_of(config: Config) -> Callable[[float], Quadrature]:
+    """`illumination` by wavelength step, nm, of a config."""
+    return partial(illumination, config.material, config.spectrum, config.coherence.sigma_um)
+
+
+def integrand_of(config: Config) -> Callable[[float], Quadrature]:
+    """`integrand` by wavelength step, nm, of a config."""
+    return partial(integrand, config.material, config.spectrum, config.coherence.sigma_um)
 
 
 def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Array, cos_half: Array) -> Array:
@@ -54,7 +66,7 @@ def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Arra
     return _metal(material, trapezoid(spectrum, FINE_STEP_NM), lambda_nm, cos_half)
 
 
-def integrand(material: Material, spectrum: Spectrum, step_nm: float, sigma_um: float) -> Quadrature:
+def integrand(material: Material, spectrum: Spectrum, sigma_um: float, step_nm: float) -> Quadrature:
     """Light, observer and all of the material that varies with wavelength, as one quadrature for |P|^2."""
     quadrature = trapezoid(spectrum, step_nm)
     factor = spectral_factor(material, quadrature, sigma_um)

@@ -35,7 +35,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     power = spectrum.load(inputs["spectrum"])
     plan = spectrum.planned(inputs["spectrum"])
-    light = partial(_integrand, config)
+    light = brdf.illumination_of(config)
     budget = spectrum.budget(config)
     rules = quadrature.choose(light, plan.rings.rho(), config.coherence.sigma_um, budget.quadrature)
     reflectance = partial(brdf.spectral_reflectance, config.material, config.spectrum)
@@ -71,10 +71,6 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "certificate": asdict(certified),
         "spectral_error": None if spectral is None else asdict(spectral),
     }
-
-
-def _integrand(config: Config, step_nm: float) -> Any:
-    return brdf.illumination(config.material, config.spectrum, step_nm, config.coherence.sigma_um)
 
 
 def load(artifact: Artifact) -> polar.PolarTable:

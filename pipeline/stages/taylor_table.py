@@ -33,7 +33,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     built = stack.load(inputs["stack"])
     section = stack.layout_of(config)
-    quadrature = brdf.integrand(config.material, config.spectrum, section.step_nm, config.coherence.sigma_um)
+    quadrature = brdf.integrand_of(config)(section.step_nm)
     table = taylor.build(built, quadrature, section.resolution, section.power, config.scene, progress)
     nodes = grid.nodes(table.resolution, table.power)
     arrays.save(

@@ -1,13 +1,13 @@
 """What polar tables of every grid are made of: a stack, and the nodes, terms and light that all of them share."""
 
 from dataclasses import dataclass
+from functools import partial
 
 from kernels.polar import RingQuadratures
 from pipeline import spectrum
 from pipeline.config import LaserLine, Material, Spectrum
 from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
 from pipeline.spectrum import PolarSpectrum
 from pipeline.stack import Stack
 from pipeline.tables import polar, quadrature
@@ -41,11 +41,9 @@ class Ingredients:
 
     def rules(self, rho: Array) -> RingQuadratures:
         """Wavelengths of every ring."""
-        return quadrature.choose(self._integrand, rho, self.stack.sigma_um, self.quadrature_error)
+        light = partial(brdf.integrand, Material(), self.light, self.stack.sigma_um)
+        return quadrature.choose(light, rho, self.stack.sigma_um, self.quadrature_error)
 
     def table(self, made: PolarSpectrum, rings: Rings) -> PolarTable:
         """The table of E on these rings."""
         return polar.build(made, rings, self.rules(rings.rho()), self.w_terms)
-
-    def _integrand(self, step_nm: float) -> Quadrature:
-        return brdf.integrand(Material(), self.light, step_nm, self.stack.sigma_um)

@@ -9,7 +9,7 @@ import pytest
 from pipeline.config import Config
 from pipeline.evaluate import Map
 from pipeline.figures import map_physics, method_traits
-from pipeline.figures.exact_maps import NORMAL, ExactMaps, blazed_recipe, directions, lit_views, reference
+from pipeline.figures.exact_maps import NORMAL, blazed_recipe, directions, lit_views, reference
 from pipeline.figures.figure import Bench, Surface
 from pipeline.figures.truncated_series import ChebyshevSeries, TaylorSeries
 from pipeline.methods.catalogue import METHODS
@@ -160,22 +160,6 @@ def test_oscillation_is_that_of_a_known_ripple() -> None:
 def test_black_views_are_not_lit() -> None:
     """1500 RU of 1e-9 of white is below one step of 255, of 1e-3 far above."""
     assert lit_views(np.array([[1e-9] * 3, [1e-3] * 3])).tolist() == [False, True]
-
-
-# --- maps --------------------------------------------------------------------------------------------
-
-
-def test_exact_maps_are_made_once_and_told_apart(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    made, views = ExactMaps(), Map(11, 0.98)
-    normal, tilted = made.of(bench.elaphe, views, [NORMAL, (20.0, 0.0)], silent)
-    assert np.any(normal != tilted)
-    # another surface of the same name
-    other = made.of(surface("elaphe", seed=2), views, [NORMAL], silent)[0]
-    assert np.any(other != normal)
-    monkeypatch.delattr(Reference, "xyz")
-    again = made.of(bench.elaphe, views, [(20.0, 0.0), NORMAL], silent)
-    assert again[0] is tilted
-    assert again[1] is normal
 
 
 # --- pages -------------------------------------------------------------------------------------------

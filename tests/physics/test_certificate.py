@@ -36,10 +36,7 @@ def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
         windows.places(field_of(found), found.coherence), sigma, found.spectrum, found.scene, budget, found.table
     )
 
-    def light(step_nm: float):
-        return brdf.illumination(found.material, found.spectrum, step_nm, sigma)
-
-    rules = quadrature.choose(light, chosen.rings.rho(), sigma, budget.quadrature)
+    rules = quadrature.choose(brdf.illumination_of(found), chosen.rings.rho(), sigma, budget.quadrature)
     reflectance = partial(brdf.spectral_reflectance, found.material, found.spectrum)
     return polar.build(power, chosen.rings, rules, chosen.w_terms, reflectance), chosen
 

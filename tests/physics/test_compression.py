@@ -1,5 +1,7 @@
 """Few textures: a basis that dim texels share, an envelope that half floats hold, and the targets on real scans."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -146,7 +148,7 @@ def snake_table(name: str) -> tuple[PolarTable, Array, Array, Array]:
     stack = spectrum.chebyshev_stack(field, sigma, radius[-1], 16, 1e-5)
     power = spectrum.build(stack, Azimuths(1792, 0.87), radius, 380.0, 12)
     rings = Rings(140, 0.1)
-    rules = quadrature.choose(lambda step: brdf.integrand(material, light, step, sigma), rings.rho(), sigma, 3e-4)
+    rules = quadrature.choose(partial(brdf.integrand, material, light, sigma), rings.rho(), sigma, 3e-4)
     # every 29th pixel of the map over which this project states colour errors
     wr = Map(301, 0.98).views()[::29]
     wi = np.broadcast_to([0.0, 0.0, 1.0], wr.shape)

@@ -107,7 +107,7 @@ def test_a_ring_holds_the_integral_over_wavelengths(w_terms: int) -> None:
 def test_wavelengths_follow_the_radius() -> None:
     """Near the mirror direction a few, at the rim many; and the estimate bounds what is measured."""
     rho, tolerance = Rings(40, 0.1).rho(), 1e-3
-    light = partial(lambda step: brdf.integrand(Material(), LIGHT, step, 16.25))
+    light = partial(brdf.integrand, Material(), LIGHT, 16.25)
     rules = quadrature.choose(light, rho, 16.25, tolerance)
     assert np.all(np.diff(rules.count) >= 0)
     assert rules.count[0] <= 41
@@ -127,7 +127,7 @@ def test_wavelengths_follow_the_radius() -> None:
 
 def test_every_ring_keeps_the_white() -> None:
     """20 nm alone would miss a hundredth of Z's whole integral, in the mirror direction above all."""
-    light = partial(lambda step: brdf.integrand(Material(), LIGHT, step, 16.25))
+    light = partial(brdf.integrand, Material(), LIGHT, 16.25)
     rules = quadrature.choose(light, Rings(40, 0.1).rho(), 16.25, 1e-3)
     white = light(0.05).weights.sum(axis=0)
     for first, count in zip(rules.first, rules.count, strict=True):
@@ -136,16 +136,14 @@ def test_every_ring_keeps_the_white() -> None:
 
 def test_a_laser_line_needs_one_wavelength() -> None:
     light = Spectrum(illuminant=LaserLine(lambda_nm=532.0))
-    rules = quadrature.choose(
-        lambda step: brdf.integrand(Material(), light, step, 16.25), np.arange(3.0), 16.25, 1e-3
-    )
+    rules = quadrature.choose(partial(brdf.integrand, Material(), light, 16.25), np.arange(3.0), 16.25, 1e-3)
     np.testing.assert_array_equal(rules.lambda_um, [0.532])
     np.testing.assert_array_equal(rules.count, [1, 1, 1])
 
 
 def test_a_window_too_wide_for_the_finest_step_is_refused() -> None:
     with pytest.raises(AccuracyError, match="closer than"):
-        quadrature.choose(lambda step: brdf.integrand(Material(), LIGHT, step, 300.0), np.array([2.0]), 300.0, 1e-4)
+        quadrature.choose(partial(brdf.integrand, Material(), LIGHT, 300.0), np.array([2.0]), 300.0, 1e-4)
 
 
 def test_a_mirror_keeps_its_lobe() -> None:
