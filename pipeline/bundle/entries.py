@@ -10,6 +10,7 @@ from pipeline.digest import of_file
 from pipeline.optics import validity
 from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.store import Artifact
+from pipeline.surface.statistics import Period
 from pipeline.tables import grid
 
 _NOT_RECORDED = "not recorded"
@@ -70,8 +71,9 @@ def domain(config: Config, inputs: Mapping[str, Artifact]) -> Domain:
     illuminant = config.spectrum.illuminant
     lambda_nm = illuminant.lambda_nm if isinstance(illuminant, LaserLine) else _LUMINOUS_NM
     statistics = inputs["surface"].summary["statistics"]
-    periods = [period["period_um"] for period in statistics["periods"]]
-    found = validity.place(min(periods), statistics["sigma_h_um"], lambda_nm) if periods else None
+    periods = [Period(**period) for period in statistics["periods"]]
+    finest = validity.finest_period_um(periods)
+    found = validity.place(finest, statistics["sigma_h_um"], lambda_nm) if periods else None
     return Domain(
         lambda_nm=lambda_nm,
         period_over_lambda=None if found is None else found.period,

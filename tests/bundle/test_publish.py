@@ -19,6 +19,7 @@ from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
 from pipeline.optics import validity
 from pipeline.stages import taylor_table
+from pipeline.surface.statistics import Period
 from pipeline.tables import grid
 
 from .conftest import SCENE, Baker, small
@@ -87,7 +88,7 @@ def test_the_manifest_tells_errors_coverage_and_origin(bake: Baker, bundle: Path
 
 def test_the_scalar_models_domain_is_told(bake: Baker, bundle: Path) -> None:
     told, statistics = manifest_of(bundle).domain, bake(small())["surface"].summary["statistics"]
-    finest = min(period["period_um"] for period in statistics["periods"])
+    finest = validity.finest_period_um([Period(**period) for period in statistics["periods"]])
     assert told.lambda_nm == 550.0
     assert told.period_over_lambda == pytest.approx(finest / 0.55)
     found = validity.place(finest, statistics["sigma_h_um"], 550.0)

@@ -1,0 +1,80 @@
+"""Gratings in closed form: where their orders leave, and how much of the light each takes.
+
+A grating of period L along x has P(f) = c_m at f = m / L (under a window of many periods), the Fourier coefficient of
+exp(i s h) with s = k w < 0. Powers |c_m|^2 are shares of a mirror's and sum to 1 over all m at fixed s.
+"""
+
+import numpy as np
+from scipy.special import jv
+
+from pipeline.optics import geometry
+from pipeline.optics.geometry import Array
+
+Values = Array | float
+
+
+def view_of_order(wi: Array, order: Values, lambda_over_period: Values) -> Array:
+    """The direction (..., 3) into which order m leaves, wr = -wi - (m lambda / L, 0, .), [D14] eq. 13.
+
+    `wi` (..., 3), the others (...,). NaN where the order does not propagate.
+    """
+    x = -wi[..., 0] - np.asarray(order) * np.asarray(lambda_over_period)
+    y = np.broadcast_to(-wi[..., 1], x.shape)
+    rest = 1.0 - x**2 - y**2
+    return np.stack([x, y, np.sqrt(np.where(rest > 0.0, rest, np.nan))], axis=-1)
+
+
+def efficiency(power: Values, wi: Array, wr: Array) -> Array:
+    """Share of the incident light that the scalar BRDF sends into an order of |c_m|^2 = `power`: |c_m|^2 G / w^2.
+
+    It is the BRDF G / (lambda^2 w^2) 4 pi sigma^2 |P|^2 of a perfect metal, integrated over the order's lobe:
+    cos(tr) dOmega = du dv, |P|^2 = |c_m|^2 exp(-|f - f_m|^2 / sigma_f^2), and the integral of that over f is
+    pi sigma_f^2 = 1 / (4 pi sigma^2). At normal incidence G / w^2 = 1 / cos(tr).
+    """
+    return np.asarray(power * geometry.obliquity(wi, wr) / geometry.uvw(wi, wr)[..., 2] ** 2)
+
+
+def sinusoid(order: Values, s_per_um: Values, amplitude_um: Values) -> Array:
+    """J_m(s a)^2 of h = a cos(2 pi x / L) (Jacobi-Anger)."""
+    return np.asarray(jv(order, np.asarray(s_per_um) * amplitude_um) ** 2)
+
+
+def blaze(order: Values, s_per_um: Values, height_um: Values) -> Array:
+    """sinc^2(m + s H / 2 pi) of a sawtooth that rises towards +x from 0 to H; sinc(x) = sin(pi x) / (pi x)."""
+    return np.asarray(np.sinc(_shift(order, s_per_um, height_um)) ** 2)
+
+
+def sampled_blaze(order: Values, s_per_um: Values, height_um: Values, samples: int) -> Array:
+    """The same of heights at `samples` places a period: a geometric sum in place of the integral.
+
+    Between 0 and sin^2(pi d) / (3 M^2) above the integral where d = m + s H / 2 pi stays well below M.
+    """
+    shift = _shift(order, s_per_um, height_um)
+    return np.asarray((np.sinc(shift) / np.sinc(shift / samples)) ** 2)
+
+
+def rectangle(order: Values, s_per_um: Values, height_um: Values, duty: float) -> Array:
+    """|c_m|^2 of height H over the share `duty` of each period, else 0.
+
+    4 sin^2(s H / 2) sin^2(pi m duty) / (pi m)^2, and 1 - 4 duty (1 - duty) sin^2(s H / 2) at m = 0.
+    """
+    return _two_levels(order, s_per_um, height_um, duty, np.ones(()))
+
+
+def sampled_rectangle(order: Values, s_per_um: Values, height_um: Values, duty: float, samples: int) -> Array:
+    """The same of `samples` heights a period, duty * samples whole: M sin(pi m / M) takes the place of pi m.
+
+    At most 4 / (3 M^2) above the integral where m stays well below M.
+    """
+    return _two_levels(order, s_per_um, height_um, duty, np.sinc(np.asarray(order) / samples))
+
+
+def _shift(order: Values, s_per_um: Values, height_um: Values) -> Array:
+    """How many orders away from the blaze an order is."""
+    return np.asarray(order + np.asarray(s_per_um) * height_um / (2.0 * np.pi))
+
+
+def _two_levels(order: Values, s_per_um: Values, height_um: Values, duty: float, lengthened: Array) -> Array:
+    order, step = np.asarray(order), np.sin(0.5 * np.asarray(s_per_um) * height_um) ** 2
+    side = 4.0 * step * (duty * np.sinc(order * duty) / lengthened) ** 2
+    return np.asarray(np.where(order == 0, 1.0 - 4.0 * duty * (1.0 - duty) * step, side))
