@@ -1,9 +1,7 @@
 """`run` and `plan`: what a config needs, and doing it."""
 
-import importlib
 import os
 import shutil
-import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -33,22 +31,15 @@ def run_command(
     changed are taken from the store. All configs are checked before the first one is baked.
     """
     if until is not None:
-        _import_ahead()
         _bake_until(load_all(config_paths), until, store_root, as_json)
         return
     bake_all(config_paths, out, store_root, as_json, with_bundle=True)
-
-
-def _import_ahead() -> None:
-    """Imports colour-science, which takes a second, beside what comes before its first use."""
-    threading.Thread(target=importlib.import_module, args=("colour",), daemon=True).start()
 
 
 def bake_all(
     paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, *, with_bundle: bool
 ) -> None:
     """Every stage of CONFIGs, what people look at laid out, and what came of it told."""
-    _import_ahead()
     loaded = load_all(paths)
     _require_folders(loaded, out)
     results = [_bake(config, out, store_root, with_bundle) for config in loaded]

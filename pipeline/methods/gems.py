@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.config import Config
 from pipeline.errors import ConfigError
 from pipeline.evaluate import relative_unit
+from pipeline.optics import colour_data
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
@@ -65,9 +66,7 @@ class Gems:
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        import colour
-
-        return np.asarray(self._unit * self.rgb(wi, wr) @ colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ.T)
+        return np.asarray(self._unit * self.rgb(wi, wr) @ colour_data.srgb_to_xyz().T)
 
     def rgb(self, wi: Array, wr: Array) -> Array:
         """The shader's own colour (directions, 3), linear, not clipped."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.optics import colour_data
 from pipeline.optics.geometry import Array
 
 # the exposures of [D14] table 2, in RU (1 RU saturates a mirror seen in its own reflection)
@@ -13,9 +14,7 @@ DISPLAY_GAMMA = 2.2  # [D14] sec. 7
 
 def displayed_srgb(xyz: Array, exposure_ru: float) -> Array:
     """Linear sRGB in [0, 1], clipped, of XYZ (..., 3) at an exposure."""
-    import colour
-
-    rgb = (exposure_ru * xyz) @ colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB.T
+    rgb = (exposure_ru * xyz) @ colour_data.xyz_to_srgb().T
     return np.asarray(np.clip(rgb, 0.0, 1.0))
 
 
@@ -27,15 +26,18 @@ def pixels(xyz: Array, exposure_ru: float) -> np.ndarray:
 
 def delta_e(xyz: Array, reference: Array, exposure_ru: float) -> Array:
     """CIELAB difference (...,) of 1976 under D65 between two displayed colours."""
-    import colour
+    to_xyz = colour_data.srgb_to_xyz().T
+    shown = (displayed_srgb(values, exposure_ru) @ to_xyz for values in (xyz, reference))
+    found, true = (cielab(values) for values in shown)
+    return np.asarray(np.linalg.norm(found - true, axis=-1))
 
-    space = colour.RGB_COLOURSPACES["sRGB"]
 
-    def lab(values: Array) -> Array:
-        shown = displayed_srgb(values, exposure_ru) @ space.matrix_RGB_to_XYZ.T
-        return np.asarray(colour.XYZ_to_Lab(shown, space.whitepoint))
-
-    return np.asarray(np.linalg.norm(lab(xyz) - lab(reference), axis=-1))
+def cielab(xyz: Array) -> Array:
+    """L*, a*, b* (..., 3) under D65 of XYZ (..., 3), white at Y = 1 (CIE 15:2004, 8.2.1)."""
+    t = xyz / colour_data.srgb_white()
+    f = np.where(t > (6.0 / 29.0) ** 3, np.cbrt(t), t * (29.0 / 6.0) ** 2 / 3.0 + 4.0 / 29.0)
+    x, y, z = np.moveaxis(f, -1, 0)
+    return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
 
 
 @dataclass(frozen=True)

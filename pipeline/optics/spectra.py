@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.config import LaserLine, Spectrum
 from pipeline.errors import ScanError
+from pipeline.optics import colour_data
 from pipeline.optics.fresnel import read_columns
 from pipeline.optics.geometry import Array
 
@@ -63,10 +64,7 @@ def illuminant_at(name: str, lambda_nm: Array) -> Array:
         table = read_columns(Path(name).read_bytes(), 2, name)
         nodes, power = table[:, 0], table[:, 1]
     else:
-        import colour
-
-        distribution = colour.SDS_ILLUMINANTS[name]
-        nodes, power = distribution.wavelengths, distribution.values
+        nodes, power = colour_data.illuminant(name)
     _require_covered(name, nodes, lambda_nm)
     values = np.interp(lambda_nm, nodes, power)
     if np.any(values < 0) or not np.any(values > 0):
@@ -82,11 +80,9 @@ def observer_at(name: str, lambda_nm: Array) -> Array:
 
     Raises ScanError where they do not cover them: those of 2015 start at 390 nm.
     """
-    import colour
-
-    functions = colour.MSDS_CMFS[name]
-    _require_covered(name, functions.wavelengths, lambda_nm)
-    columns = [np.interp(lambda_nm, functions.wavelengths, functions.values[:, c]) for c in range(3)]
+    nodes, values = colour_data.observer(name)
+    _require_covered(name, nodes, lambda_nm)
+    columns = [np.interp(lambda_nm, nodes, values[:, c]) for c in range(3)]
     return np.stack(columns, axis=-1)
 
 
