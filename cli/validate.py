@@ -74,11 +74,28 @@ def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root:
     if as_json:
         console.print_json({**pages.document(made), "files": [str(path) for path in written]})
         return
-    console.print_table(
-        ["page", "what", "expected", "measured", "verdict"],
-        [[p.figure.name, c.what, c.expected, c.measured, c.verdict] for p in made for c in p.figure.checks],
-    )
+    _tell(made)
     click.echo(str(folder / "index.html"))
+
+
+def _tell(made: list[Any]) -> None:
+    """A row a page, then every statement that does not hold."""
+    verdicts = [[check.verdict for check in page.figure.checks] for page in made]
+    console.print_table(
+        ["page", "holds", "misses", "told", "time"],
+        [
+            [
+                page.figure.name,
+                *(str(found.count(word)) for word in ("holds", "MISSES", "told")),
+                f"{page.seconds:.0f} s",
+            ]
+            for page, found in zip(made, verdicts, strict=True)
+        ],
+    )
+    for page in made:
+        for check in page.figure.checks:
+            if check.holds is False:
+                click.echo(f"{page.figure.name}: {check.what}: expected {check.expected}, measured {check.measured}")
 
 
 def _surface(name: str, path: Path | None, store: Any) -> Any:

@@ -18,6 +18,10 @@ class Check:
     measured: str
     holds: bool | None
 
+    def __post_init__(self) -> None:
+        # comparisons of numpy's numbers give numpy's truth, which neither `is True` nor JSON knows
+        object.__setattr__(self, "holds", None if self.holds is None else bool(self.holds))
+
     @property
     def verdict(self) -> str:
         """In a word."""

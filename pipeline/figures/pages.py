@@ -6,6 +6,8 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from pipeline import provenance
 from pipeline.figures.figure import Bench, Figure
 from pipeline.progress import Progress
@@ -57,8 +59,17 @@ def document(made: Sequence[Made]) -> dict[str, Any]:
                 "source": page.figure.source,
                 "seconds": page.seconds,
                 "checks": [asdict(check) for check in page.figure.checks],
-                "numbers": page.figure.numbers,
+                "numbers": _plain(page.figure.numbers),
             }
             for page in made
         ],
     }
+
+
+def _plain(value: Any) -> Any:
+    """Without numpy's types, which JSON does not know."""
+    if isinstance(value, dict):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

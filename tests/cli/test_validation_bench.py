@@ -3,12 +3,13 @@
 import json
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from pipeline.figures import pages
 from pipeline.figures.figure import Bench, Check, Figure, Picture, Table
 from pipeline.report.plots import png
-from tests.cli.tool import REPOSITORY, Tool
+from tests.cli.tool import REPOSITORY, Tool, too_wide
 
 
 class Links(HTMLParser):
@@ -23,6 +24,9 @@ class Links(HTMLParser):
             self.found += [value for name, value in attrs if name == "href" and value]
 
 
+NUMBERS = {"deep": [{"at": (np.float64(1.5), np.arange(2))}], 3: np.bool_(True)}
+
+
 def picture() -> bytes:
     from matplotlib.figure import Figure as Drawing
 
@@ -33,12 +37,14 @@ def picture() -> bytes:
 
 def first(bench: Bench, _progress: object) -> Figure:
     checks = [
-        Check("samples", "> 0", str(bench.elaphe.field.shape), bench.elaphe.field.heights_um.size > 0),
+        Check("samples", "> 0", str(bench.elaphe.field.shape), np.all(bench.elaphe.field.heights_um < 1e3)),
         Check("a <tag> & more", "1", "2", False),
         Check("published", "39", "40", None),
     ]
     table = Table("Rows", ("a", "b"), [("1", "2")])
-    return Figure("first", "First", "[D14] fig. 1", "all well", checks, [table], [Picture(picture(), "a line")])
+    return Figure(
+        "first", "First", "[D14] fig. 1", "all well", checks, [table], [Picture(picture(), "a line")], numbers=NUMBERS
+    )
 
 
 @pytest.fixture
@@ -66,9 +72,12 @@ def test_it_writes_a_page_a_figure_and_tells_verdicts(tool: Tool) -> None:
         assert all((folder / address).is_file() for address in links.found)
         assert "a &lt;tag&gt; &amp; more" in text
     assert "data:image/png;base64," in page
-    rows = [line.split() for line in result.stdout.splitlines()]
-    assert [row[-1] for row in rows[1:4]] == ["holds", "MISSES", "told"]
+    lines = result.stdout.splitlines()
+    assert lines[1].split()[:4] == ["first", "1", "1", "1"]
+    assert lines[2] == "first: a <tag> & more: expected 1, measured 2"
+    assert too_wide(result.stdout) == []
     document = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
+    assert document["pages"][0]["numbers"] == {"deep": [{"at": [1.5, [0, 1]]}], "3": True}
     assert [check["holds"] for check in document["pages"][0]["checks"]] == [True, False, None]
 
 
@@ -84,7 +93,7 @@ def test_a_config_stands_for_a_snake(tool: Tool) -> None:
     config = tool.config("mine.toml", name="mine")
     result = tool("validate", "--bench", "--elaphe", config)
     assert result.code == 0, result.stderr
-    assert "(100, 100)" in result.stdout
+    assert "(100, 100)" in (tool.out / "validation" / "first.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
