@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.config import Config
 from pipeline.config import Surface as SurfaceSection
-from pipeline.figures.screen import LIGHT, Screen, bands_of, experiment
+from pipeline.figures.laser_screen import LIGHT, Screen, bands_of, experiment
 from pipeline.optics import geometry
 from pipeline.optics.fresnel import read_columns
 from pipeline.optics.spectra import illuminant_at, trapezoid

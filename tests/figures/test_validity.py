@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.config import Config
-from pipeline.figures import coupled_wave, validity
+from pipeline.figures import coupled_wave, scalar_errors, validity
 from pipeline.figures.coupled_wave import Grating, Resolution
 from pipeline.figures.figure import Bench, Surface
-from pipeline.figures.validity import Case
+from pipeline.figures.scalar_errors import Case
 from pipeline.optics import fresnel
 from pipeline.optics import validity as domain
 from pipeline.progress import silent
@@ -20,7 +20,7 @@ needs_solver = pytest.mark.skipif(not coupled_wave.available(), reason="meent, o
 
 DEPTHS = (0.1, 0.3, 0.5)
 KNOWN = {key: value for key, value in validity._INTEGRAL.items() if key[3] < 4.0 and key != validity._RESONANCE}
-LONG = [Case(shape, validity.DIELECTRIC, 30.0, 7.4) for shape in validity.SHAPES]
+LONG = [Case(shape, scalar_errors.DIELECTRIC, 30.0, 7.4) for shape in scalar_errors.SHAPES]
 
 
 def small_bench() -> Bench:
@@ -33,11 +33,11 @@ def small_bench() -> Bench:
 
 def test_a_staircase_is_solid_under_its_columns() -> None:
     """Three heights of a blaze: two layers, the upper one under one column."""
-    stairs = coupled_wave.staircase(validity.sawtooth, 3)
+    stairs = coupled_wave.staircase(scalar_errors.sawtooth, 3)
     np.testing.assert_array_equal(stairs.solid, [[False, False, True], [False, True, True]])
     np.testing.assert_allclose(stairs.thickness, 1.0 / 3.0)
     # both flanks of a sinusoid are in one layer
-    assert len(coupled_wave.staircase(validity.cosine, 24).thickness) == 11
+    assert len(coupled_wave.staircase(scalar_errors.cosine, 24).thickness) == 11
 
 
 @needs_solver
@@ -71,7 +71,7 @@ def test_a_lamellar_metal_grating_converges_as_published(
 @pytest.mark.parametrize("polarisation", coupled_wave.POLARISATIONS)
 def test_a_metal_without_losses_keeps_all_light(polarisation: coupled_wave.Polarisation) -> None:
     """eps = -100: orders share exactly what comes in, at any resolution."""
-    grating = Grating(validity.sawtooth, 3.3, 0.3, 1e-7 + 10.0j)
+    grating = Grating(scalar_errors.sawtooth, 3.3, 0.3, 1e-7 + 10.0j)
     found = coupled_wave.solve(grating, np.array([0.1, 0.4]), polarisation, Resolution(8, 8))
     np.testing.assert_allclose(np.sum(found, axis=1), 1.0, atol=1e-5)
 
@@ -79,8 +79,8 @@ def test_a_metal_without_losses_keeps_all_light(polarisation: coupled_wave.Polar
 @needs_solver
 def test_light_and_view_may_change_places() -> None:
     """Reciprocity of an order's efficiency: from theta to its direction, and back."""
-    period, theta, index = 2.3, 0.25, validity.INDICES[validity.DIELECTRIC]
-    there = Grating(validity.sawtooth, period, theta, index)
+    period, theta, index = 2.3, 0.25, scalar_errors.INDICES[scalar_errors.DIELECTRIC]
+    there = Grating(scalar_errors.sawtooth, period, theta, index)
     # travels towards +x at sin t, leaves towards sin t - 1 / period; back it travels towards 1 / period - sin t
     back = replace(there, theta=float(np.arcsin(1.0 / period - np.sin(theta))))
     for polarisation in coupled_wave.POLARISATIONS:
@@ -92,15 +92,15 @@ def test_light_and_view_may_change_places() -> None:
 
 
 @pytest.fixture(scope="module")
-def solved() -> dict[Case, validity.Efficiencies]:
+def solved() -> dict[Case, scalar_errors.Efficiencies]:
     """Some cases side by side, as the page solves them."""
-    return validity.sweep([*(Case(*key[:4]) for key in KNOWN), *LONG], np.array(DEPTHS), silent)
+    return scalar_errors.sweep([*(Case(*key[:4]) for key in KNOWN), *LONG], np.array(DEPTHS), silent)
 
 
 @needs_solver
 @pytest.mark.parametrize("key", KNOWN, ids=str)
 def test_extrapolated_waves_meet_a_boundary_integral(
-    solved: dict[Case, validity.Efficiencies], key: tuple[str, str, float, float, float]
+    solved: dict[Case, scalar_errors.Efficiencies], key: tuple[str, str, float, float, float]
 ) -> None:
     """Two rigorous methods, one number, in unpolarised light."""
     found = solved[Case(*key[:4])].rigorous[DEPTHS.index(key[4])]
@@ -109,7 +109,7 @@ def test_extrapolated_waves_meet_a_boundary_integral(
 
 @needs_solver
 @pytest.mark.parametrize("case", LONG, ids=str)
-def test_long_shallow_gratings_are_scalar(solved: dict[Case, validity.Efficiencies], case: Case) -> None:
+def test_long_shallow_gratings_are_scalar(solved: dict[Case, scalar_errors.Efficiencies], case: Case) -> None:
     """Signs and factors of both sides: they differ by little of the order itself."""
     found, shallow = solved[case], DEPTHS.index(0.1)
     assert abs(found.error[shallow]) < 0.02 * found.rigorous[shallow]
@@ -117,18 +117,18 @@ def test_long_shallow_gratings_are_scalar(solved: dict[Case, validity.Efficienci
 
 @needs_solver
 def test_a_blaze_sends_light_to_its_side() -> None:
-    grating = Grating(validity.sawtooth, 7.4, 0.0, validity.INDICES[validity.DIELECTRIC])
+    grating = Grating(scalar_errors.sawtooth, 7.4, 0.0, scalar_errors.INDICES[scalar_errors.DIELECTRIC])
     orders = coupled_wave.solve(grating, np.array([0.3]), "TE", Resolution(12, 12))[0]
     assert orders[13] > 3.0 * orders[11]
 
 
 def test_the_scalar_side_is_the_reflectance_of_a_mirror_where_all_light_goes_one_way() -> None:
     """A blaze of half a wavelength in a period without end: R |c_1|^2 G / w^2 = R(ti)."""
-    case = Case("blaze", validity.METAL, 0.0, 1e4)
-    ours, bare = validity.scalar(case, np.array([0.5]))
+    case = Case("blaze", scalar_errors.METAL, 0.0, 1e4)
+    ours, bare = scalar_errors.scalar(case, np.array([0.5]))
     assert ours[0] == pytest.approx(1.0, abs=1e-6)
     assert bare[0] == pytest.approx(1.0, abs=1e-6)
-    assert fresnel.reflectance(1.0, validity.INDICES[validity.METAL]) == pytest.approx(0.914, abs=1e-3)
+    assert fresnel.reflectance(1.0, scalar_errors.INDICES[scalar_errors.METAL]) == pytest.approx(0.914, abs=1e-3)
 
 
 def test_the_quoted_table_falls_with_period_and_rises_with_depth() -> None:
@@ -172,17 +172,18 @@ def test_without_the_solver_the_page_quotes_its_table(monkeypatch: pytest.Monkey
 
 @needs_solver
 def test_the_page_says_where_the_table_does_not_hold(
-    monkeypatch: pytest.MonkeyPatch, solved: dict[Case, validity.Efficiencies]
+    monkeypatch: pytest.MonkeyPatch, solved: dict[Case, scalar_errors.Efficiencies]
 ) -> None:
     """The checks themselves, over a few cases: a table too low fails, and one far too high where all was measured."""
-    case = Case("sinusoid", validity.METAL, 0.0, 3.05)
-    found = validity.Sweep((3.05,), DEPTHS, (0.0,), {case: solved[case]})
-    monkeypatch.setattr(validity, "INDICES", {validity.METAL: validity.INDICES[validity.METAL]})
-    shape = validity.SHAPES["sinusoid"]
+    case = Case("sinusoid", scalar_errors.METAL, 0.0, 3.05)
+    found = scalar_errors.Sweep((3.05,), DEPTHS, (0.0,), {case: solved[case]})
+    monkeypatch.delitem(scalar_errors.INDICES, scalar_errors.DIELECTRIC)
+    monkeypatch.delitem(scalar_errors.SHAPES, "blaze")
+    shape = scalar_errors.SHAPES["sinusoid"]
 
     def held(quoted: float, whole: bool) -> bool | None:
         table = tuple((quoted,) * len(domain.DEPTHS) for _ in domain.PERIODS)
-        monkeypatch.setattr(validity, "SHAPES", {"sinusoid": replace(shape, quoted=table)})
+        monkeypatch.setitem(scalar_errors.SHAPES, "sinusoid", replace(shape, quoted=table))
         return validity._domain_checks(found, whole)[0].holds
 
     assert held(0.01, False)

@@ -11,31 +11,11 @@ from pipeline.methods.flss import Flss
 from pipeline.methods.method import PUBLISHED_STEP_NM, Monochromatic, prepare
 from pipeline.optics import geometry
 from pipeline.reference import Reference
-from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
+from tests.methods.surfaces import ELAPHE, SIGMA, config, made
 
-SIGMA = 6.5
 # one part in ten million of a mirror: four decades below what an exposure of 1000 RU shows
 DARK = 1e-7
-
-
-def config(recipe: dict[str, object], sigma: float = SIGMA, **sections: object) -> Config:
-    return Config.model_validate(
-        {"name": "t", "surface": {"recipe": recipe}, "coherence": {"sigma_um": sigma}, **sections}
-    )
-
-
-def made(of: Config) -> HeightField:
-    assert of.surface.recipe is not None
-    return recipes.make(of.surface.recipe)
-
-
-ELAPHE = config({"kind": "elaphe", "size_um": 4 * SIGMA, "pitch_um": 0.1})
-
-
-@pytest.fixture(scope="module")
-def elaphe() -> HeightField:
-    return made(ELAPHE)
 
 
 def errors(method: Flss, field: HeightField, of: Config) -> np.ndarray:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pipeline.config import Config
 from pipeline.directions import random_pairs
 from pipeline.errors import ConfigError
 from pipeline.methods.dft_terms import FULL
@@ -13,25 +12,9 @@ from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.spectra import trapezoid
 from pipeline.reference import Reference
-from pipeline.surface import recipes
-from pipeline.surface.heightfield import HeightField
+from tests.methods.surfaces import ELAPHE, SIGMA, config, made
 
 RANGE = (380.0, 780.0)
-SIGMA = 6.5
-
-
-def config(recipe: dict[str, object], sigma: float = SIGMA, **sections: object) -> Config:
-    return Config.model_validate(
-        {"name": "t", "surface": {"recipe": recipe}, "coherence": {"sigma_um": sigma}, **sections}
-    )
-
-
-def made(of: Config) -> HeightField:
-    assert of.surface.recipe is not None
-    return recipes.make(of.surface.recipe)
-
-
-ELAPHE = config({"kind": "elaphe", "size_um": 4 * SIGMA, "pitch_um": 0.1})
 
 
 def around_the_mirror(radii: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

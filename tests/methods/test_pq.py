@@ -4,37 +4,16 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from pipeline.config import Config
 from pipeline.methods.dft_terms import Coefficients
 from pipeline.methods.flss import Flss
 from pipeline.methods.method import Monochromatic
 from pipeline.methods.pq import Pq
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e
-from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
+from tests.methods.surfaces import ELAPHE, config, made
 
-SIGMA = 6.5
 NM = np.array([550.0])
-
-
-def config(recipe: dict[str, object], sigma: float = SIGMA, **sections: object) -> Config:
-    return Config.model_validate(
-        {"name": "t", "surface": {"recipe": recipe}, "coherence": {"sigma_um": sigma}, **sections}
-    )
-
-
-def made(of: Config) -> HeightField:
-    assert of.surface.recipe is not None
-    return recipes.make(of.surface.recipe)
-
-
-ELAPHE = config({"kind": "elaphe", "size_um": 4 * SIGMA, "pitch_um": 0.1})
-
-
-@pytest.fixture(scope="module")
-def elaphe() -> HeightField:
-    return made(ELAPHE)
 
 
 @pytest.mark.parametrize("patches", [(1, 1), (2, 2), (3, 2)])
