@@ -41,7 +41,8 @@ def bake_all(
 ) -> None:
     """Every stage of CONFIGs, what people look at laid out, and what came of it told."""
     loaded = load_all(paths)
-    _require_folders(loaded, out)
+    for config in loaded:
+        require_folder(out / config.name)
     results = [_bake(config, out, store_root, with_bundle) for config in loaded]
     if as_json:
         console.print_json(results)
@@ -107,15 +108,13 @@ def load_all(paths: tuple[Path, ...]) -> list[Config]:
     return loaded
 
 
-def _require_folders(loaded: list[Config], out: Path) -> None:
+def require_folder(folder: Path) -> None:
     """Better told now than after the work, and nothing is made yet. Raises StorageError."""
     from pipeline.errors import StorageError
 
-    for config in loaded:
-        folder = out / config.name
-        standing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-        if not (standing.is_dir() and os.access(standing, os.W_OK | os.X_OK)):
-            raise StorageError(f"{folder}: cannot be written, for {standing} is no folder to write in; see --out")
+    standing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not (standing.is_dir() and os.access(standing, os.W_OK | os.X_OK)):
+        raise StorageError(f"{folder}: cannot be written, for {standing} is no folder to write in; see --out")
 
 
 def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> dict[str, Any]:

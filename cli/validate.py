@@ -6,9 +6,7 @@ from typing import Any
 import click
 
 from cli import console, sources
-from cli.bake import bake_all
-
-_ROLES = ("elaphe", "xenopeltis")
+from cli.bake import bake_all, require_folder
 
 
 @click.command("validate")
@@ -60,14 +58,11 @@ def validate_command(
 def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root: Path | None, as_json: bool) -> None:
     from pipeline.figures import pages
     from pipeline.figures.figure import Bench
-    from pipeline.store import writing
 
-    # better told now than after minutes of work
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+    require_folder(folder)
     store = console.open_store(store_root)
-    surfaces = {name: _surface(name, path, store) for name, path in {"blazed": None, **roles}.items()}
-    bench = Bench(**surfaces, quick=quick)
+    configs = _configs({"blazed": None, **roles})
+    bench = Bench(**{role: _surface(role, config, store) for role, config in configs.items()}, quick=quick)
     with console.showing_progress() as progress:
         made = list(pages.make_all(bench, progress, console.note))
     written = _write(made, folder)
@@ -98,22 +93,43 @@ def _tell(made: list[Any]) -> None:
                 click.echo(f"{page.figure.name}: {check.what}: expected {check.expected}, measured {check.measured}")
 
 
-def _surface(name: str, path: Path | None, store: Any) -> Any:
-    """A surface of the bench: a config's, or the recipe of its name."""
+def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
+    """Every role's config, its own or the recipe of its name, all read before anything is computed.
+
+    Raises ConfigError for two of one name, which no page could tell apart, and for a laser line.
+    """
+    from pipeline.config import Config, LaserLine
+    from pipeline.errors import ConfigError
+
+    found: dict[str, Config] = {}
+    for role, path in roles.items():
+        recipe = {"name": role, "surface": {"recipe": {"kind": role}}}
+        config = Config.model_validate(recipe) if path is None else sources.load(path)
+        taken = next((other for other, each in found.items() if each.name == config.name), None)
+        if taken is not None:
+            fault = f"{config.name!r} is also the name of what stands for {taken}; give this one another"
+            raise ConfigError(str(path or role), [("name", fault)])
+        if isinstance(config.spectrum.illuminant, LaserLine):
+            fault = f"expected a range of wavelengths, whose colours --bench compares, got a laser line; see --{role}"
+            raise ConfigError(str(path), [("spectrum.illuminant", fault)])
+        found[role] = config
+    return found
+
+
+def _surface(role: str, config: Any, store: Any) -> Any:
+    """A surface of the bench. Raises ScanError for a flat one."""
     from pipeline import run
-    from pipeline.config import Config
+    from pipeline.errors import ScanError
     from pipeline.figures.figure import Surface
     from pipeline.stages import surface
 
-    if path is not None:
-        config = sources.load(path)
-    else:
-        config = Config.model_validate({"name": name, "surface": {"recipe": {"kind": name}}})
     console.note(f"{config.name}:")
     with console.showing_progress() as progress:
         told = console.teller(config, store)
         made = run.execute(config, run.plan(config, store, "surface"), store, progress, told)
     field = surface.load(store.open("surface", made["surface"].key))
+    if field.half_range_um == 0.0:
+        raise ScanError(f"{config.name}: expected a surface with a relief for --{role}, got a flat one")
     return Surface(config, field, config.surface.recipe is None)
 
 

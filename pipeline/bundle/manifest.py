@@ -245,6 +245,10 @@ class Domain(Section):
     """
 
     model: str = "scalar: one reflection, no polarisation, no shadows but the V-cavity's"
+    meaning: str = (
+        "errors are of an order's efficiency, shares of what the flat surface reflects, for smooth slopes and for "
+        "edges; within: both are at most `tolerated`; null: beyond what was compared, or a surface without a period"
+    )
     lambda_nm: float
     period_over_lambda: float | None
     error_of_smooth: float | None

@@ -183,7 +183,7 @@ def _resembles(elaphe: _Shown, look_up: Array) -> Check:
     ours = [elaphe.error(ru) for ru in (SHOWN_RU, STRICT_RU)]
     return Check(
         f"Elaphe: mean dE of the paper's look-up from the reference at {SHOWN_RU:g} and {STRICT_RU:g} RU",
-        "visually similar (fig. 13)",
+        "visually similar (fig. 13); this project's table nearer at the higher exposure",
         f"{paper[0]:.2f} and {paper[1]:.2f}; this project's table {ours[0]:.3f} and {ours[1]:.3f}",
         ours[1] < paper[1],
     )
@@ -195,7 +195,7 @@ def _within_budget(shown: Sequence[_Shown]) -> Check:
     mean, worst = sum(errors.values()) / len(errors), max(errors, key=lambda name: errors[name])
     return Check(
         f"this project's table against the exact maps, mean dE at {STRICT_RU:g} RU",
-        f"{budget:g}, what it is planned for",
+        f"at most {budget:g} in the mean over maps, what it is planned for",
         f"{mean:.3f}; of single maps at most {errors[worst]:.3f} ({worst})",
         mean <= budget,
     )

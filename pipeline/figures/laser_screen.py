@@ -20,6 +20,8 @@ APERTURE_UM = 65.0
 # the screen shows little else but the light near the mirror direction, which random directions seldom meet
 # a step of luminance that is barely seen, Weber's fraction: a band of less contrast is none
 VISIBLE_CONTRAST = 0.02
+# of the brightest row: a darker one counts as that dark
+_DARK_SHARE = 1e-9
 DELTA_E = 0.04
 # columns this near the middle hold the spot and a vertical band; rows this near it hold the primary band
 _SPOT_MM, _PRIMARY_MM = 15.0, 8.0
@@ -116,6 +118,7 @@ def bands_of(luminance: Array, axis_mm: Array) -> Bands:
         floor = np.minimum.accumulate(outwards)[outside]
         rise = outwards[outside] - floor
         # beyond the scan's band all is dark
-        contrast = max(contrast, float(np.max(rise / np.maximum(floor, np.finfo(float).tiny))))
+        dark = _DARK_SHARE * float(profile.max())
+        contrast = max(contrast, float(np.max(rise / np.maximum(floor, dark))))
         excess, light = excess + float(rise.sum()), light + float(outwards[outside].sum())
     return Bands(profile, contrast, excess / light)

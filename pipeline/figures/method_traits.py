@@ -31,6 +31,7 @@ FRINGE_FROM = 0.7
 # of Elaphe's primary band: where the first order lies in visible light, and how wide it is seen
 _PRIMARY_X, _PRIMARY_Y, _PRIMARY_SAMPLES = (0.35, 0.65), 0.03, (61, 25)
 _BAND_X, _BAND_Y = (0.25, 0.75), 0.05
+_DARK_SHARE = 1e-9  # of the brightest row: a darker one counts as that dark
 
 
 def flss_error(surface: Surface, exact: Method) -> float:
@@ -100,7 +101,8 @@ def band_contrast(luminance: Array, views: Map) -> float:
         outwards = np.flatnonzero(side)[np.argsort(distance[side])]
         outwards = outwards[(distance[outwards] > _BAND_Y) & (distance[outwards] < _BAND_X[1])]
         floor = np.minimum.accumulate(profile[outwards])
-        contrast = max(contrast, float(np.max(profile[outwards] / floor - 1.0)))
+        dark = _DARK_SHARE * float(profile.max())
+        contrast = max(contrast, float(np.max(profile[outwards] / np.maximum(floor, dark) - 1.0)))
     return contrast
 
 

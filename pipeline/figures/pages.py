@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from pipeline import provenance
-from pipeline.figures.figure import Bench, Figure
+from pipeline.errors import BakeError
+from pipeline.figures.figure import Bench, Check, Figure
 from pipeline.progress import Progress
 
 # modules of this package, each with a `make`; imported when their turn comes
@@ -41,10 +42,25 @@ def make_all(bench: Bench, progress: Progress, tell: Callable[[str], None]) -> I
     """Every page, one after the other; `tell` hears of each."""
     for name in PAGES:
         started = time.perf_counter()
-        figure = import_module(f"pipeline.figures.{name}").make(bench, progress)
+        try:
+            figure = import_module(f"pipeline.figures.{name}").make(bench, progress)
+        except BakeError as error:
+            figure = _not_made(name, error)
         made = Made(figure, time.perf_counter() - started)
         tell(f"  {name:<20} {made.seconds:5.1f} s")
         yield made
+
+
+def _not_made(name: str, error: BakeError) -> Figure:
+    """A page that these surfaces do not allow says so, and takes no other page with it."""
+    reason = " ".join(str(error).split())
+    return Figure(
+        name=name,
+        title=f"{name.replace('_', ' ').capitalize()}: not made",
+        source="",
+        expected="",
+        checks=[Check("this page, of these surfaces", "made", reason, False)],
+    )
 
 
 def document(made: Sequence[Made]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config import Material
+from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window, sigma_f
 from pipeline.optics.geometry import Array
@@ -105,7 +106,7 @@ def _parabola(values: Array, f: Array, place: NDArray[np.intp]) -> Array:
 def persistent(values: Array, f: Array, count: int, apart: float) -> Array:
     """Where (count,) the mean over wavelengths of `values` (L, k), each row over its largest, is brightest.
 
-    Only local maxima count, and none within `apart` of a brighter one. Raises ValueError where there are fewer.
+    Only local maxima count, and none within `apart` of a brighter one. Raises AccuracyError where there are fewer.
     """
     mean = np.mean(values / values.max(axis=1, keepdims=True), axis=0)
     tops = 1 + np.flatnonzero((mean[1:-1] > mean[:-2]) & (mean[1:-1] >= mean[2:]))
@@ -114,7 +115,7 @@ def persistent(values: Array, f: Array, count: int, apart: float) -> Array:
         if all(abs(f[top] - f[other]) >= apart for other in chosen):
             chosen.append(int(top))
     if len(chosen) < count:
-        raise ValueError(f"expected {count} peaks, found {len(chosen)}")
+        raise AccuracyError(f"expected {count} peaks of the reflectance, found {len(chosen)}: too small a patch?")
     return np.asarray(f[chosen[:count]])
 
 

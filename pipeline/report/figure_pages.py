@@ -6,6 +6,16 @@ from pipeline.figures.figure import Figure
 from pipeline.figures.pages import Made
 from pipeline.report.page import Page
 
+_SOURCES = (
+    "[D14] Dhillon et al., Interactive Diffraction from Biological Nanostructures, 2014. [S14] Single, An "
+    "Interactive Shader for Natural Diffraction Gratings, 2014. [S99] Stam, Diffraction Shaders, 1999. [G04] Stam, "
+    "Simulating Diffraction, GPU Gems ch. 8, 2004."
+)
+_TERMS = (
+    "1 RU saturates a mirror seen in its own reflection. dE is CIELAB dE*ab of 1976 between displayed colours. a is "
+    "the exponent of the paper's grid, N the order of its Taylor series; FLSS, NMM and PQ are [S14]'s shaders. "
+    "Statements are judged where source or theory says what must come out, else told."
+)
 _CHECKS = ("what", "expected", "measured", "verdict")
 
 
@@ -33,9 +43,11 @@ def index(made: Sequence[Made]) -> str:
     holding = sum(check.holds is True for check in judged)
     found = Page(
         "Validation bench",
-        f"{holding} of {len(judged)} statements hold, {len(checks) - len(judged)} are told beside published values"
+        f"{holding} of {len(judged)} judged statements hold, {len(checks) - len(judged)} more are told and not judged"
         f". {sum(one.seconds for one in made):.0f} s in all.",
     )
+    found.text(_SOURCES)
+    found.text(_TERMS)
     for one in made:
         figure = one.figure
         found.section(figure.title, figure.source)

@@ -6,10 +6,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from pipeline.errors import AccuracyError
 from pipeline.figures import pages
 from pipeline.figures.figure import Bench, Check, Figure, Picture, Table
 from pipeline.report.plots import png
-from tests.cli.tool import REPOSITORY, Tool, too_wide
+from tests.cli.tool import REPOSITORY, Tool, recipe, too_wide
 
 
 class Links(HTMLParser):
@@ -64,7 +65,7 @@ def test_it_writes_a_page_a_figure_and_tells_verdicts(tool: Tool) -> None:
     folder = tool.out / "validation"
     assert sorted(path.name for path in folder.iterdir()) == ["first.html", "index.html", "validation.json"]
     index, page = ((folder / name).read_text(encoding="utf-8") for name in ("index.html", "first.html"))
-    assert "1 of 2 statements hold, 1 are told beside published values" in index
+    assert "1 of 2 judged statements hold, 1 more are told and not judged" in index
     for text in (index, page):
         links = Links()
         links.feed(text)
@@ -104,6 +105,48 @@ def test_what_does_not_go_together_is_refused(tool: Tool, arguments: list[str]) 
     result = tool("validate", *arguments)
     assert result.code == 2
     assert "--bench" in result.stderr
+
+
+@pytest.mark.usefixtures("one_page")
+@pytest.mark.parametrize(
+    ("changes", "code", "said"),
+    [
+        ({"name": "blazed"}, 2, "also the name of what stands for blazed"),
+        ({"surface": recipe("mirror")}, 3, "got a flat one"),
+    ],
+)
+def test_surfaces_that_say_nothing_are_refused_at_once(tool: Tool, changes: dict, code: int, said: str) -> None:
+    result = tool("validate", "--bench", "--elaphe", tool.config("odd.toml", **changes))
+    assert (result.code, len(result.errors)) == (code, 1)
+    assert said in result.errors[0]
+    assert not (tool.out / "validation").exists()
+
+
+@pytest.mark.usefixtures("one_page")
+def test_a_laser_line_has_no_colours_to_compare(tool: Tool) -> None:
+    config = tool.folder / "laser.toml"
+    text = 'name = "laser"\n[surface]\nrecipe = { kind = "elaphe" }\n[spectrum]\nilluminant = { lambda_nm = 532 }\n'
+    config.write_text(text, encoding="utf-8")
+    result = tool("validate", "--bench", "--xenopeltis", config)
+    assert (result.code, len(result.errors)) == (2, 1)
+    assert "got a laser line; see --xenopeltis" in result.errors[0]
+
+
+@pytest.mark.usefixtures("one_page")
+def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_bench: Bench, _progress: object) -> Figure:
+        raise AccuracyError("too tall")
+
+    class Refusing:
+        make = staticmethod(refuse)
+
+    modules = {"pipeline.figures.first": pages.import_module("first"), "pipeline.figures.tall_one": Refusing}
+    monkeypatch.setattr(pages, "PAGES", ("tall_one", "first"))
+    monkeypatch.setattr(pages, "import_module", modules.__getitem__)
+    result = tool("validate", "--bench")
+    assert result.code == 0, result.stderr
+    assert "tall_one: this page, of these surfaces: expected made, measured too tall" in result.stdout
+    assert (tool.out / "validation" / "first.html").is_file()
 
 
 def test_every_page_is_there() -> None:
