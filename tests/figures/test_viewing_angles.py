@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.config import Blazed, Config, Sinusoid
 from pipeline.config import Surface as SurfaceSection
+from pipeline.errors import AccuracyError
 from pipeline.figures import peaks, viewing_angles
 from pipeline.figures.figure import Bench, Surface
 from pipeline.figures.first_order import ROWS, THETA_I, Row, cut_of
@@ -79,7 +80,7 @@ def test_persistent_lines_are_found_by_brightness_and_apart() -> None:
     values = sum(height * np.exp(-(((f - top) / 0.006) ** 2)) for top, height in lobes)
     found = peaks.persistent(np.stack([values, 7.0 * values]), f, 2, apart=0.05)
     np.testing.assert_allclose(found, [1.3, 1.7], atol=0.0026)
-    with pytest.raises(ValueError, match="expected 9 peaks"):
+    with pytest.raises(AccuracyError, match="expected 9 peaks"):
         peaks.persistent(values[None], f, 9, apart=0.05)
 
 
