@@ -66,7 +66,7 @@ class Gems:
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        return np.asarray(self._unit * self.rgb(wi, wr) @ colour_data.srgb_to_xyz().T)
+        return np.asarray(self._unit * self.rgb(wi, wr) @ colour_data.srgb().to_xyz.T)
 
     def rgb(self, wi: Array, wr: Array) -> Array:
         """The shader's own colour (directions, 3), linear, not clipped."""

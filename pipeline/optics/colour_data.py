@@ -7,9 +7,11 @@ needs in the cache leaves it alone.
 import os
 import zipfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import platformdirs
@@ -17,72 +19,55 @@ import platformdirs
 from pipeline import digest
 from pipeline.optics.geometry import Array
 
-Tables = dict[str, Array]
+Tables = dict[str, Any]
 
 
-@cache
+@dataclass(frozen=True)
+class Srgb:
+    """Linear sRGB: matrices (3, 3) to XYZ and from it, as the standard rounds them, and XYZ (3,) of its white."""
+
+    to_xyz: Array
+    from_xyz: Array
+    white: Array
+
+
 def illuminant(name: str) -> tuple[Array, Array]:
     """Wavelengths (n,), nm, and relative spectral power (n,) of an illuminant."""
-
-    def read() -> Tables:
-        import colour
-
-        found = colour.SDS_ILLUMINANTS[name]
-        return {"lambda_nm": found.wavelengths, "values": found.values}
-
-    tables = _kept(f"illuminant {name}", read)
-    return tables["lambda_nm"], tables["values"]
+    return _spectral("SDS_ILLUMINANTS", name)
 
 
-@cache
 def observer(name: str) -> tuple[Array, Array]:
     """Wavelengths (n,), nm, and colour matching functions (n, 3) of an observer."""
+    return _spectral("MSDS_CMFS", name)
+
+
+@cache
+def srgb() -> Srgb:
+    """The space that displays show."""
 
     def read() -> Tables:
         import colour
 
-        found = colour.MSDS_CMFS[name]
+        space = colour.RGB_COLOURSPACES["sRGB"]
+        x, y = space.whitepoint
+        white = np.array([x / y, 1.0, (1.0 - x - y) / y])
+        return {"to_xyz": space.matrix_RGB_to_XYZ, "from_xyz": space.matrix_XYZ_to_RGB, "white": white}
+
+    return Srgb(**_kept("sRGB", read))
+
+
+@cache
+def _spectral(dataset: str, name: str) -> tuple[Array, Array]:
+    """Wavelengths and values of an entry of one of the library's datasets."""
+
+    def read() -> Tables:
+        import colour
+
+        found = getattr(colour, dataset)[name]
         return {"lambda_nm": found.wavelengths, "values": found.values}
 
-    tables = _kept(f"observer {name}", read)
+    tables = _kept(f"{dataset} {name}", read)
     return tables["lambda_nm"], tables["values"]
-
-
-@cache
-def srgb_to_xyz() -> Array:
-    """The matrix (3, 3) from linear sRGB to XYZ."""
-
-    def read() -> Tables:
-        import colour
-
-        return {"matrix": colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ}
-
-    return _kept("sRGB to XYZ", read)["matrix"]
-
-
-@cache
-def xyz_to_srgb() -> Array:
-    """The matrix (3, 3) from XYZ to linear sRGB, as the standard rounds it: not quite the other's inverse."""
-
-    def read() -> Tables:
-        import colour
-
-        return {"matrix": colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB}
-
-    return _kept("XYZ to sRGB", read)["matrix"]
-
-
-@cache
-def srgb_white() -> Array:
-    """XYZ (3,) of sRGB's white, Y = 1."""
-
-    def read() -> Tables:
-        import colour
-
-        x, y = colour.RGB_COLOURSPACES["sRGB"].whitepoint
-        return {"white": np.array([x / y, 1.0, (1.0 - x - y) / y])}
-
-    return _kept("sRGB white", read)["white"]
 
 
 def _kept(what: str, read: Callable[[], Tables]) -> Tables:
@@ -90,14 +75,15 @@ def _kept(what: str, read: Callable[[], Tables]) -> Tables:
     folder = Path(platformdirs.user_cache_dir("diffract-bake")) / f"colour-science-{version('colour-science')}"
     file = folder / f"{digest.of_json(what)}.npz"
     try:
-        with np.load(file) as kept:
+        # numpy leaves a damaged file open that it opened itself
+        with file.open("rb") as stream, np.load(stream) as kept:
             return {name: np.asarray(kept[name], float) for name in kept.files}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         tables = {name: np.asarray(values, float) for name, values in read().items()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         beside = file.with_name(f"{file.stem}-{os.getpid()}.writing.npz")
-        np.savez(beside, allow_pickle=False, **tables)
+        np.savez(beside, **tables)
         beside.replace(file)
     except OSError:
         pass  # a cache that cannot be written only costs the next process its import

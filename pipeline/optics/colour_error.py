@@ -14,7 +14,7 @@ DISPLAY_GAMMA = 2.2  # [D14] sec. 7
 
 def displayed_srgb(xyz: Array, exposure_ru: float) -> Array:
     """Linear sRGB in [0, 1], clipped, of XYZ (..., 3) at an exposure."""
-    rgb = (exposure_ru * xyz) @ colour_data.xyz_to_srgb().T
+    rgb = (exposure_ru * xyz) @ colour_data.srgb().from_xyz.T
     return np.asarray(np.clip(rgb, 0.0, 1.0))
 
 
@@ -26,7 +26,7 @@ def pixels(xyz: Array, exposure_ru: float) -> np.ndarray:
 
 def delta_e(xyz: Array, reference: Array, exposure_ru: float) -> Array:
     """CIELAB difference (...,) of 1976 under D65 between two displayed colours."""
-    to_xyz = colour_data.srgb_to_xyz().T
+    to_xyz = colour_data.srgb().to_xyz.T
     shown = (displayed_srgb(values, exposure_ru) @ to_xyz for values in (xyz, reference))
     found, true = (cielab(values) for values in shown)
     return np.asarray(np.linalg.norm(found - true, axis=-1))
@@ -34,7 +34,7 @@ def delta_e(xyz: Array, reference: Array, exposure_ru: float) -> Array:
 
 def cielab(xyz: Array) -> Array:
     """L*, a*, b* (..., 3) under D65 of XYZ (..., 3), white at Y = 1 (CIE 15:2004, 8.2.1)."""
-    t = xyz / colour_data.srgb_white()
+    t = xyz / colour_data.srgb().white
     f = np.where(t > (6.0 / 29.0) ** 3, np.cbrt(t), t * (29.0 / 6.0) ** 2 / 3.0 + 4.0 / 29.0)
     x, y, z = np.moveaxis(f, -1, 0)
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
