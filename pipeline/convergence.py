@@ -106,11 +106,7 @@ class TaylorStudy:
         plain = trapezoid(self._config.spectrum, step_nm)
 
         def evaluate(wi: Array, wr: Array) -> Array:
-            uvw = geometry.uvw(wi, wr)
-            turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
-            i_p = taylor.node_values(fewer, brdf.integrand_of(self._config)(step_nm), turn[:, None] * uvw[:, :2])
-            # I_p(-u, -v) = (-1)^p I_p(u, v), so w takes the turn's sign
-            summed = taylor.sum_powers(i_p, turn * uvw[:, 2])
+            summed = taylor.at_directions(fewer, brdf.integrand_of(self._config)(step_nm), geometry.uvw(wi, wr))
             return brdf.direction_factor(self._config.material, plain, wi, wr)[:, None] * summed
 
         return self._views.error(evaluate)

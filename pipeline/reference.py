@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import diffraction
 from pipeline import series, stack, windows
@@ -55,14 +56,14 @@ def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: flo
             # vecdot conjugates its first; a product of matrices would start threads that get in each other's way
             amplitude += np.sum(along_y[rows] * np.vecdot(np.cos(phase) - 1j * np.sin(phase), along_x))
         power[i] = np.abs(amplitude / total) ** 2
-    power[~in_band(field, uvw, lambda_um)] = np.nan
+    power[~in_band(field, uvw, np.array([lambda_um]))[:, 0]] = np.nan
     return power
 
 
-def in_band(field: HeightField, uvw: Array, lambda_um: float) -> np.ndarray:
-    """Whether (u, v) / lambda lies within the scan's band limit along both axes."""
+def in_band(field: HeightField, uvw: Array, lambda_um: Array) -> NDArray[np.bool_]:
+    """Whether (u, v) / lambda lies within the scan's band limit along both axes, (directions, L)."""
     fx, fy = field.band_limit_per_um
-    return np.asarray((np.abs(uvw[:, 0]) / lambda_um <= fx) & (np.abs(uvw[:, 1]) / lambda_um <= fy))
+    return np.asarray((np.abs(uvw[:, :1]) / lambda_um <= fx) & (np.abs(uvw[:, 1:2]) / lambda_um <= fy))
 
 
 def xyz_direct(

@@ -52,13 +52,12 @@ class TaylorSeries:
 
     def xyz(self, order: int, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) of the terms up to `order`."""
-        config, uvw = self.surface.config, geometry.uvw(wi, wr)
-        light = brdf.integrand_of(config)(STEP_NM)
-        # I_p(-u, -v) = (-1)^p I_p(u, v): half of (u, v) is enough where w takes the turn's sign
-        turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
-        i_p = taylor.node_values(_cut(self.stack, order), light, turn[:, None] * uvw[:, :2])
+        config = self.surface.config
+        summed = taylor.at_directions(
+            _cut(self.stack, order), brdf.integrand_of(config)(STEP_NM), geometry.uvw(wi, wr)
+        )
         factor = brdf.direction_factor(config.material, trapezoid(config.spectrum, STEP_NM), wi, wr)
-        return np.asarray(factor[:, None] * taylor.sum_powers(i_p, turn * uvw[:, 2]))
+        return np.asarray(factor[:, None] * summed)
 
 
 @dataclass(frozen=True)

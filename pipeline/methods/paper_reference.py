@@ -50,17 +50,13 @@ class PaperReference:
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|P|^2 (directions, L); NaN beyond the scan's band."""
-        # I_p(-u, -v) = (-1)^p I_p(u, v): half of (u, v) is enough where w takes the turn's sign
-        turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
         out = np.empty((len(uvw), len(lambda_nm)))
         for first in range(0, len(lambda_nm), 3):
             three = lambda_nm[first : first + 3]
             # the integral's three channels, each given one wavelength: I_p is then |P|^2 ordered by powers of w
             single = Quadrature(three, np.eye(len(three), 3))
-            i_p = taylor.node_values(self._stack, single, turn[:, None] * uvw[:, :2])
-            out[:, first : first + 3] = taylor.sum_powers(i_p, turn * uvw[:, 2])[:, : len(three)]
-        known = np.stack([in_band(self._field, uvw, 1e-3 * nm) for nm in lambda_nm], axis=-1)
-        return np.where(known, out, np.nan)
+            out[:, first : first + 3] = taylor.at_directions(self._stack, single, uvw)[:, : len(three)]
+        return np.where(in_band(self._field, uvw, 1e-3 * lambda_nm), out, np.nan)
 
 
 def taylor_stack(field: HeightField, config: Config, tolerance: float) -> Stack:

@@ -51,8 +51,7 @@ class PolarTableMethod:
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|P|^2 (directions, L); NaN beyond the scan's band."""
         found = spectral.look_up(self._spectral, uvw, lambda_nm)
-        known = np.stack([in_band(self._field, uvw, 1e-3 * nm) for nm in lambda_nm], axis=-1)
-        return np.where(known, found, np.nan)
+        return np.where(in_band(self._field, uvw, 1e-3 * lambda_nm), found, np.nan)
 
     @cached_property
     def _spectral(self) -> SpectralTable:

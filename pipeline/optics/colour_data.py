@@ -79,7 +79,7 @@ def _kept(what: str, read: Callable[[], Tables]) -> Tables:
         with file.open("rb") as stream, np.load(stream) as kept:
             return {name: np.asarray(kept[name], float) for name in kept.files}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
-        tables = {name: np.asarray(values, float) for name, values in read().items()}
+        tables: Tables = {name: np.asarray(values, float) for name, values in read().items()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         beside = file.with_name(f"{file.stem}-{os.getpid()}.writing.npz")

@@ -99,6 +99,13 @@ def sum_powers(i_p: Array, w: Array) -> Array:
     return total
 
 
+def at_directions(stack: Stack, quadrature: Quadrature, uvw: Array) -> Array:
+    """sum_p w^p I_p (directions, 3) in float64 at `uvw` (directions, 3) themselves, without a grid between."""
+    # I_p(-u, -v) = (-1)^p I_p(u, v): half of (u, v) is enough where w takes the turn's sign
+    turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
+    return sum_powers(node_values(stack, quadrature, turn[:, None] * uvw[:, :2]), turn * uvw[:, 2])
+
+
 def look_up(table: TaylorTable, uvw: Array) -> Array:
     """sum_p w^p I_p (directions, 3) at `uvw` (directions, 3), bilinear between nodes.
 
