@@ -1,6 +1,7 @@
 """Host side of the polar kernels: power spectrum, spectral operator, splines. Layouts as stated in opencl/*.cl."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,34 @@ def integrate(
     rules one after the other, w_terms) multiplies E at `w_nodes`; w_terms is a multiple of 4.
     """
     tiles, radii, nodes, _ = spectrum.shape
-    w_terms = reflectance.shape[1]
+    operator = _operator(radius_per_um, nodes, s_max_per_um, rho, quadratures, reflectance)
+    out = device.empty((len(rho), 3 * reflectance.shape[1], LANES * tiles), np.float32)
+    power, result = device.lent(spectrum), device.shared(out)
+    size = len(rho), tiles, operator.groups
+    operator.program.launch("apply_operator", size, power, np.int32(radii), operator.places, operator.matrix, result)
+    return device.settle(result, out)
+
+
+@dataclass(frozen=True)
+class _Operator:
+    """The matrices of all rings on the device, where each stands, and in how many groups their outputs come."""
+
+    program: device.Program
+    places: Any
+    matrix: Any
+    groups: int
+
+
+def _operator(
+    radius_per_um: np.ndarray,
+    nodes: int,
+    s_max_per_um: float,
+    rho: np.ndarray,
+    quadratures: RingQuadratures,
+    reflectance: np.ndarray,
+) -> _Operator:
+    """The operator from E on `nodes` in s to every ring, for `integrate`'s arguments."""
+    w_terms, radii = reflectance.shape[1], len(radius_per_um)
     outputs = 3 * w_terms
     groups = -(-outputs // _MOST_OUTPUTS)
     # outputs come in vectors of four
@@ -125,10 +153,7 @@ def integrate(
         w_node,
         matrix,
     )
-    out = device.empty((len(rho), outputs, LANES * tiles), np.float32)
-    power, result = device.lent(spectrum), device.shared(out)
-    program.launch("apply_operator", (len(rho), tiles, groups), power, np.int32(radii), places, matrix, result)
-    return device.settle(result, out)
+    return _Operator(program, places, matrix, groups)
 
 
 def extents(radius_per_um: np.ndarray, rho: np.ndarray, quadratures: RingQuadratures, nodes: int) -> np.ndarray:
