@@ -98,8 +98,6 @@ def pairs(count: int) -> tuple[Array, Array]:
 
 def make(bench: Bench, progress: Progress) -> Figure:
     """The page: closed forms of gratings, and the bench's own surfaces by integration."""
-    from pipeline.report import validity_plots
-
     sigma_um = bench.blazed.config.coherence.sigma_um
     angles = _FEWER_DEG if bench.quick else _ANGLES_DEG
     known, snakes = known_gratings(), (bench.elaphe, bench.xenopeltis)
@@ -121,8 +119,6 @@ def make(bench: Bench, progress: Progress) -> Figure:
     progress("energy", 0.7)
     symmetric = _asymmetries(bench.elaphe, _FEWER_PAIRS if bench.quick else _PAIRS)
     progress("energy", 1.0)
-    dense = np.linspace(0.0, 80.0, 641)
-    ratios = np.geomspace(1.05, 20.0, 800)
     return Figure(
         name="energy",
         title="Energy balance and reciprocity",
@@ -131,50 +127,9 @@ def make(bench: Bench, progress: Progress) -> Figure:
         "mirror's directional albedo is 1. Directions have different w, and G / w² stands before |P|², so a rough "
         "surface keeps its energy only as far as its orders stay away from the horizon. Light and view may change "
         "places exactly.",
-        checks=[
-            *(
-                Check(
-                    f"Σ|c_m|² of all orders at one w, {name}",
-                    "1 to 1e-9",
-                    f"1 {found - 1.0:+.1e}",
-                    abs(found - 1) < 1e-9,
-                )
-                for name, found in sums.items()
-            ),
-            *(
-                Check(
-                    f"albedo of a flat mirror, light at {deg:g}°",
-                    f"1 to {_MIRROR_TOLERANCE:g}" if deg <= _JUDGED_MIRROR else "1 while the lobe is narrow",
-                    f"{found:.5f}",
-                    abs(found - 1.0) <= _MIRROR_TOLERANCE if deg <= _JUDGED_MIRROR else None,
-                )
-                for deg, found in mirror.items()
-            ),
-            *_lobe_checks(known, clear, lobes),
-            *(
-                Check(
-                    f"BRDF with light and view changed, {what}",
-                    f"equal to {_RECIPROCITY:g}",
-                    f"{found:.1e}",
-                    found <= _RECIPROCITY,
-                )
-                for what, found in symmetric.items()
-            ),
-        ],
+        checks=[*_closed_checks(sums, mirror), *_lobe_checks(known, clear, lobes), *_reciprocity_checks(symmetric)],
         tables=[_table(known, snakes, angles, measured)],
-        pictures=[
-            Picture(
-                validity_plots.albedo_curves(
-                    {g.name: (dense, closed_albedo(g, np.radians(dense))) for g in known},
-                    {g.name: (np.array(clear), lobes[g.name]) for g in known},
-                    {name: (angles, found) for name, found in measured.items()},
-                    {g.name: (ratios, _normal_albedo(g, ratios)) for g in known},
-                ),
-                f"Directional albedo at {LAMBDA_NM:g} nm, R = 1, no shadowing. Left: sums of the propagating orders' "
-                "|c_m|² G / w² (lines), the BRDF integrated over the hemisphere (dots). Middle: the bench's snakes, "
-                "integrated. Right: gratings in normal light against their period.",
-            )
-        ],
+        pictures=[_curves(known, clear, lobes, angles, measured)],
         remarks=_remarks(),
         numbers={
             "order_sums": sums,
@@ -185,6 +140,60 @@ def make(bench: Bench, progress: Progress) -> Figure:
             },
             "asymmetry": symmetric,
         },
+    )
+
+
+def _closed_checks(sums: dict[str, float], mirror: dict[float, float]) -> list[Check]:
+    """Of gratings' order sums by name, and of the mirror's albedo by the light's angle."""
+    orders = [
+        Check(f"Σ|c_m|² of all orders at one w, {name}", "1 to 1e-9", f"1 {found - 1.0:+.1e}", abs(found - 1) < 1e-9)
+        for name, found in sums.items()
+    ]
+    albedos = [
+        Check(
+            f"albedo of a flat mirror, light at {deg:g}°",
+            f"1 to {_MIRROR_TOLERANCE:g}" if deg <= _JUDGED_MIRROR else "1 while the lobe is narrow",
+            f"{found:.5f}",
+            abs(found - 1.0) <= _MIRROR_TOLERANCE if deg <= _JUDGED_MIRROR else None,
+        )
+        for deg, found in mirror.items()
+    ]
+    return [*orders, *albedos]
+
+
+def _reciprocity_checks(symmetric: dict[str, float]) -> list[Check]:
+    return [
+        Check(
+            f"BRDF with light and view changed, {what}",
+            f"equal to {_RECIPROCITY:g}",
+            f"{found:.1e}",
+            found <= _RECIPROCITY,
+        )
+        for what, found in symmetric.items()
+    ]
+
+
+def _curves(
+    known: Sequence[Grating],
+    clear: Sequence[float],
+    lobes: dict[str, Array],
+    angles: Array,
+    measured: dict[str, Array],
+) -> Picture:
+    from pipeline.report import validity_plots
+
+    dense, ratios = np.linspace(0.0, 80.0, 641), np.geomspace(1.05, 20.0, 800)
+    drawn = validity_plots.albedo_curves(
+        {g.name: (dense, closed_albedo(g, np.radians(dense))) for g in known},
+        {g.name: (np.array(clear), lobes[g.name]) for g in known},
+        {name: (angles, found) for name, found in measured.items()},
+        {g.name: (ratios, _normal_albedo(g, ratios)) for g in known},
+    )
+    return Picture(
+        drawn,
+        f"Directional albedo at {LAMBDA_NM:g} nm, R = 1, no shadowing. Left: sums of the propagating orders' "
+        "|c_m|² G / w² (lines), the BRDF integrated over the hemisphere (dots). Middle: the bench's snakes, "
+        "integrated. Right: gratings in normal light against their period.",
     )
 
 
