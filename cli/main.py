@@ -61,6 +61,8 @@ def main() -> None:
     """Entry point: runs the command and turns faults into exit codes."""
     from pipeline.errors import BakeError
 
+    # 2^4 cycles until waiting BLAS threads sleep: by default they spin for 2^26, on the kernels' cores
+    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
     try:
         with cli.make_context("diffract-bake", sys.argv[1:]) as context:
             cli.invoke(context)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from kernels import polar
+from kernels import polar_spectrum
+from kernels.spectral_operator import chebyshev
 from pipeline import series, stack
 from pipeline.device_stack import upload
 from pipeline.optics.coherence import sigma_f
@@ -76,7 +77,7 @@ def speckle_contrast(spectrum: PolarSpectrum) -> float:
 
 def s_nodes(count: int, s_max_per_um: float) -> Array:
     """Chebyshev's nodes on [0, s_max]."""
-    return np.asarray(0.5 * s_max_per_um * (1.0 + polar.chebyshev(count)[1]))
+    return np.asarray(0.5 * s_max_per_um * (1.0 + chebyshev(count)[1]))
 
 
 def radii(sigma_um: float, r_max_per_um: float, spacing: float = SPACING) -> Array:
@@ -117,7 +118,7 @@ def gather(
     # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
     bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
-    return polar.polar_spectrum(upload(built), radius_per_um, half_turn, bessel)
+    return polar_spectrum.gather(upload(built), radius_per_um, half_turn, bessel)
 
 
 def build(

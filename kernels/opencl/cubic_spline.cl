@@ -7,10 +7,12 @@
  *   table   float[rings][OUT][azimuths]     outputs of the spectral operator; azimuths is a multiple of 32
  *
  * Rings go on below the first, which is one point, as the opposite half turn: (-i, a) = (i, a + azimuths / 2); beyond the
- * last they are mirrored. Azimuths are periodic. Set by the host: OUT = 3 W_TERMS outputs.
+ * last they are mirrored. Azimuths are periodic. Set by the host: OUT = 3 W_TERMS outputs of a look-up; RINGS that
+ * one work-item filters.
  */
 
 #define TAIL 12
+#define BLOCK 256
 #define UNROLL _Pragma("unroll")
 
 /* sqrt(3) z^k */
@@ -18,18 +20,20 @@ __constant float weight_of[TAIL + 1] = {1.7320508e+00f, -4.6410162e-01f, 1.24355
                                         -2.3923399e-03f, 6.4102553e-04f, -1.7176227e-04f, 4.6023562e-05f, -1.2331976e-05f,
                                         3.3043430e-06f, -8.8539606e-07f, 2.3724117e-07f};
 
-/* Around the turn. One work-item, one ring and output. */
+/* Around the turn. One work-item, one ring and output; lines of BLOCK azimuths with their neighbours on either side. */
 __kernel void filter_azimuths(__global const float *in, const int azimuths, __global float *out) {
-    const long row = (long)(get_global_id(1) * OUT + get_global_id(0)) * azimuths;
-    for (int i = 0; i < azimuths; i += 16) {
-        float line[48];
-        vstore16(vload16(0, in + row + (i > 0 ? i : azimuths) - 16), 0, line);
-        vstore16(vload16(0, in + row + i), 1, line);
-        vstore16(vload16(0, in + row + (i + 16) % azimuths), 2, line);
-        float16 sum = weight_of[0] * vload16(1, line);
-        UNROLL for (int k = 1; k <= TAIL; ++k)
-            sum += weight_of[k] * (vload16(0, line + 16 - k) + vload16(0, line + 16 + k));
-        vstore16(sum, 0, out + row + i);
+    const long row = (long)(get_global_id(1) * get_global_size(0) + get_global_id(0)) * azimuths;
+    for (int from = 0; from < azimuths; from += BLOCK) {
+        const int to = min(from + BLOCK, azimuths);
+        float line[BLOCK + 32];
+        for (int i = from - 16; i < to + 16; i += 16)
+            vstore16(vload16(0, in + row + (i + azimuths) % azimuths), 0, line + i - from + 16);
+        for (int i = from; i < to; i += 16) {
+            const float *at = line + i - from + 16;
+            float16 sum = weight_of[0] * vload16(0, at);
+            UNROLL for (int k = 1; k <= TAIL; ++k) sum += weight_of[k] * (vload16(0, at - k) + vload16(0, at + k));
+            vstore16(sum, 0, out + row + i);
+        }
     }
 }
 
@@ -40,17 +44,22 @@ static int ring_of(int ring, const int rings, int *opposite) {
     return clamp(ring < rings ? ring : 2 * (rings - 1) - ring, 0, rings - 1);
 }
 
-/* Across the rings. One work-item, sixteen azimuths of one output of one ring. */
-__kernel void filter_rings(__global const float *in, const int azimuths, __global float *out) {
-    const int azimuth = 16 * get_global_id(0), output = get_global_id(1), ring = get_global_id(2), rings = get_global_size(2);
-    const int opposite_azimuth = (azimuth + azimuths / 2) % azimuths;
-    float16 sum = 0.0f;
-    UNROLL for (int k = -TAIL; k <= TAIL; ++k) {
+/* Across the rings. One work-item, sixteen azimuths of one output, RINGS rings with their neighbours on either side. */
+__kernel void filter_rings(__global const float *in, const int rings, __global float *out) {
+    const int tile = get_global_id(0), tiles = get_global_size(0), output = get_global_id(2), outputs = get_global_size(2);
+    const int from = RINGS * get_global_id(1), to = min(from + RINGS, rings);
+    float16 column[RINGS + 2 * TAIL];
+    for (int i = from - TAIL; i < to + TAIL; ++i) {
         int opposite;
-        const int from = ring_of(ring + k, rings, &opposite);
-        sum += weight_of[k < 0 ? -k : k] * vload16(0, in + (long)(from * OUT + output) * azimuths + (opposite ? opposite_azimuth : azimuth));
+        const long row = (long)ring_of(i, rings, &opposite) * outputs + output;
+        column[i - from + TAIL] = vload16(row * tiles + (opposite ? (tile + tiles / 2) % tiles : tile), in);
     }
-    vstore16(sum, 0, out + (long)(ring * OUT + output) * azimuths + azimuth);
+    for (int i = from; i < to; ++i) {
+        const float16 *at = column + i - from + TAIL;
+        float16 sum = weight_of[0] * at[0];
+        UNROLL for (int k = 1; k <= TAIL; ++k) sum += weight_of[k] * (at[-k] + at[k]);
+        vstore16(sum, ((long)i * outputs + output) * tiles + tile, out);
+    }
 }
 
 static float4 spline(const float t) {

@@ -5,122 +5,219 @@
  *                                                                         C cardinal functions of Chebyshev nodes
  *   I(rho, phi, w) = sum_k T_k(2 |w| / w_max - 1) table[k],  w_max = sqrt(4 - rho^2)
  *
- * Set by the host: ORDER (even); S_NODES; W_TERMS, a multiple of 4; OUT = 3 W_TERMS; GROUPS of GROUP outputs,
- * a multiple of 4.
+ * At a ring and a w, E is wanted along one line through the origin, r = rho kappa and s = 2 pi |w| kappa with
+ * kappa = 1 / l. It is taken there at points kappa_p, once for all wavelengths, which are interpolated from it:
+ *
+ *   G(p, w) = sum_j C_j(2 pi |w| kappa_p) E(rho kappa_p, s_j)
+ *   I(w)    = sum_p shares[p] G(p, w),   shares[p] = sum_l weights[l] L_p(1 / l)
+ *
+ * Where a ring's points are chosen on radii of E (rho kappa_p = r_a) nothing is interpolated over r.
+ *
+ * Set by the host: ORDER (even); S_NODES; W_TERMS, a multiple of W_BLOCK, and W_BLOCK, 4 or 8.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
+#define CHUNK 16  /* points whose G waits in the nearest cache */
+
+typedef struct {
+    int first, points;   /* of the ring, among those of all rings */
+    int on_radii;        /* whether they lie on radii of E */
+    int nodes, count;    /* where the ring's quadrature begins, and its length */
+    int reflected;       /* where its rows of `reflectance` begin */
+} Ring;
 
 /* r of node i; E(-r, phi) = E(r, phi + pi), so nodes go on below 0 */
 static double node(__global const double *radius, const int i) { return i < 0 ? -radius[-i] : radius[i]; }
 
-/* the first of the ORDER nodes about r >= 0, kept within the last; may be negative */
-static int first_node(__global const double *radius, const int radii, const double r) {
-    int low = 0, high = radii - 1;
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        if (radius[middle] <= r) low = middle; else high = middle;
-    }
-    return min(low - (ORDER / 2 - 1), radii - ORDER);
-}
-
-static void lagrange(__global const double *radius, const int first, const double r, float *weight) {
+/* Lagrange's polynomials on the ORDER nodes at `x`, at `at` */
+static void lagrange(const double *x, const double at, float *weight) {
     for (int a = 0; a < ORDER; ++a) {
-        double product = 1.0;
+        double above = 1.0, below = 1.0;
         for (int b = 0; b < ORDER; ++b)
-            if (b != a) product *= (r - node(radius, first + b)) / (node(radius, first + a) - node(radius, first + b));
-        weight[a] = product;
+            if (b != a) {
+                above *= at - x[b];
+                below *= x[a] - x[b];
+            }
+        weight[a] = above / below;
     }
 }
 
 /* The operator of each ring. One work-item, one ring.
  *
+ *   place     int[points]            the radius of a point, or the first of the ORDER about it: may be negative
  *   radius    double[radii]          r_a, 1/um, ascending from 0
  *   rho       double[rings]
+ *   kappa     double[points]         ascending in each ring, 1/um
  *   lambda    double[], weights float4[]    um; X, Y, Z: the nodes of every ring's quadrature
- *   nodes     int2[rings]            where a ring's quadrature begins, and its length
- *   extent    int4[rings]            first radius (may be negative), radii, where its matrix begins in units of OUT,
- *                                    where its rows of `reflectance` begin
  *   reflectance  float[...][W_TERMS] of the material at each wavelength of a ring and each node of w; 1 outside metals
  *   cardinal  float[S_NODES][S_NODES]    C_j = sum_k cardinal[k][j] T_k
- *   cosine    float4[W_TERMS][W_TERMS / 4]   Chebyshev coefficients from values at the nodes, [w node][term]
- *   w_node    float4[W_TERMS / 4]    nodes of w in [0, 1], shares of w_max
- *   matrix    float[...][GROUPS][radii of the ring * S_NODES][GROUP]
+ *   w_node    float[W_TERMS]         nodes of w in [0, 1], shares of w_max
+ *   along_r   float[points][ORDER]   L_a of a point between radii
+ *   along_s   float[points][S_NODES][W_TERMS]   C_j at every node of w
+ *   shares    float[points][3][W_TERMS]
  */
-__kernel void build_operator(__global const double *radius, const int radii, __global const double *rho,
-                             __global const double *lambda, __global const float4 *weights, __global const int2 *nodes,
-                             __global const int4 *extent, __global const float *reflectance, const float s_max, __global const float *cardinal,
-                             __global const float4 *cosine, __global const float4 *w_node, __global float *matrix) {
-    const int ring = get_global_id(0), steps = extent[ring].y * S_NODES;
-    __global float *out = matrix + (long)extent[ring].z * GROUP * GROUPS;
-    for (long k = 0; k < (long)steps * GROUP * GROUPS; ++k) out[k] = 0.0f;
-    const float w_max = sqrt(fmax(4.0 - rho[ring] * rho[ring], 0.0));
+__kernel void build_operator(__global const Ring *rings, __global const int *place, __global const double *radius,
+                             __global const double *rho, __global const double *kappa, __global const double *lambda,
+                             __global const float4 *weights, __global const float *reflectance,
+                             __global const float *cardinal, __global const float *w_node, const float s_max,
+                             __global float *along_r, __global float *along_s, __global float *shares) {
+    const int i = get_global_id(0);
+    const Ring ring = rings[i];
+    const float w_max = sqrt(fmax(4.0 - rho[i] * rho[i], 0.0));
+    double x[ORDER];
 
-    for (int l = nodes[ring].x; l < nodes[ring].x + nodes[ring].y; ++l) {
-        const double r = rho[ring] / lambda[l];
-        __global const float *reflected = reflectance + (long)(extent[ring].w + l - nodes[ring].x) * W_TERMS;
-        const int first = first_node(radius, radii, r);
-        float along_r[ORDER];
-        lagrange(radius, first, r, along_r);
-
-        /* T_k at every node of w */
-        const float scale = 2.0f * 2.0f * (float)M_PI * w_max / (float)lambda[l] / s_max;
-        float4 T[S_NODES][W_TERMS / 4];
-        for (int b = 0; b < W_TERMS / 4; ++b) {
-            const float4 z = scale * w_node[b] - 1.0f;
-            T[0][b] = 1.0f;
-            T[1][b] = z;
-            for (int k = 2; k < S_NODES; ++k) T[k][b] = 2.0f * z * T[k - 1][b] - T[k - 2][b];
+    for (int p = ring.first; p < ring.first + ring.points; ++p) {
+        if (!ring.on_radii) {
+            for (int a = 0; a < ORDER; ++a) x[a] = node(radius, place[p] + a);
+            float weight[ORDER];
+            lagrange(x, rho[i] * kappa[p], weight);
+            for (int a = 0; a < ORDER; ++a) along_r[p * ORDER + a] = weight[a];
         }
-        for (int j = 0; j < S_NODES; ++j) {
-            float value[W_TERMS];
-            for (int b = 0; b < W_TERMS / 4; ++b) {
+        const float scale = 2.0f * 2.0f * (float)M_PI * w_max * (float)kappa[p] / s_max;
+        for (int m = 0; m < W_TERMS; m += 4) {
+            const float4 z = scale * vload4(0, w_node + m) - 1.0f;
+            float4 T[S_NODES];
+            T[0] = 1.0f;
+            T[1] = z;
+            for (int k = 2; k < S_NODES; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
+            for (int j = 0; j < S_NODES; ++j) {
                 float4 sum = 0.0f;
-                for (int k = 0; k < S_NODES; ++k) sum = fma((float4)cardinal[k * S_NODES + j], T[k][b], sum);
-                vstore4(sum * vload4(b, reflected), b, value);
+                for (int k = 0; k < S_NODES; ++k) sum = fma((float4)cardinal[k * S_NODES + j], T[k], sum);
+                vstore4(sum, 0, along_s + ((long)p * S_NODES + j) * W_TERMS + m);
             }
-            float4 term[W_TERMS / 4];
-            for (int b = 0; b < W_TERMS / 4; ++b) {
-                term[b] = 0.0f;
-                for (int n = 0; n < W_TERMS; ++n) term[b] = fma((float4)value[n], cosine[n * (W_TERMS / 4) + b], term[b]);
-            }
-            for (int a = 0; a < ORDER; ++a) {
-                const int step = (first + a - extent[ring].x) * S_NODES + j;
-                const float share[3] = {weights[l].x * along_r[a], weights[l].y * along_r[a], weights[l].z * along_r[a]};
-                UNROLL for (int q = 0; q < OUT / 4; ++q) {
-                    /* four outputs, never of two groups: GROUP is a multiple of 4 */
-                    __global float *at = out + ((long)(4 * q / GROUP) * steps + step) * GROUP + 4 * q % GROUP;
-                    vstore4(fma((float4)share[4 * q / W_TERMS], term[q % (W_TERMS / 4)], vload4(0, at)), 0, at);
+        }
+        for (int o = 0; o < 3 * W_TERMS; ++o) shares[p * 3 * W_TERMS + o] = 0.0f;
+    }
+
+    /* wavelengths ascend, so the points about them descend */
+    int first = ring.points - ORDER;
+    for (int l = 0; l < ring.count; ++l) {
+        const double at = 1.0 / lambda[ring.nodes + l];
+        __global const double *about = kappa + ring.first;
+        while (first > 0 && about[first + ORDER / 2 - 1] > at) --first;
+        for (int a = 0; a < ORDER; ++a) x[a] = about[first + a];
+        float weight[ORDER];
+        lagrange(x, at, weight);
+        const float4 xyz = weights[ring.nodes + l];
+        const float channel[3] = {xyz.x, xyz.y, xyz.z};
+        __global const float *reflected = reflectance + (long)(ring.reflected + l) * W_TERMS;
+        for (int a = 0; a < ORDER; ++a) {
+            __global float *share = shares + (long)(ring.first + first + a) * 3 * W_TERMS;
+            for (int c = 0; c < 3; ++c)
+                for (int m = 0; m < W_TERMS; m += 4) {
+                    __global float *at_m = share + c * W_TERMS + m;
+                    vstore4(fma((float4)(channel[c] * weight[a]), vload4(0, reflected + m), vload4(0, at_m)), 0, at_m);
                 }
-            }
         }
     }
 }
 
-/* The table of sixteen azimuths of one ring and one group of outputs.
+/* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
+ * radii, from what was interpolated: OpenCL C asks for a function each. */
+#define ALONG_LINE(name, memory)                                                                                       \
+    static void name(memory const float *here, memory const float *opposite, __global const float *along_s,            \
+                     float16 (*line)[2]) {                                                                             \
+        float16 sum[W_BLOCK][2];                                                                                       \
+        UNROLL for (int m = 0; m < W_BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                         \
+        for (int j = 0; j < S_NODES; ++j) {                                                                            \
+            const float16 a = vload16(j, here), b = vload16(j, opposite);                                              \
+            UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                 \
+                const float16 c = along_s[j * W_TERMS + m];                                                            \
+                sum[m][0] = fma(c, a, sum[m][0]);                                                                      \
+                sum[m][1] = fma(c, b, sum[m][1]);                                                                      \
+            }                                                                                                          \
+        }                                                                                                              \
+        UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                     \
+            line[m][0] = sum[m][0];                                                                                    \
+            line[m][1] = sum[m][1];                                                                                    \
+        }                                                                                                              \
+    }
+ALONG_LINE(along_line_on_radius, __global)
+ALONG_LINE(along_line_between_radii, __private)
+
+/* E of a point between ORDER radii, at every node in s, for both tiles */
+static void between_radii(__global const float *here, __global const float *opposite, const int first,
+                          __global const float *along_r, float *e_here, float *e_opposite) {
+    for (int j = 0; j < S_NODES; ++j) {
+        float16 a = 0.0f, b = 0.0f;
+        UNROLL for (int k = 0; k < ORDER; ++k) {
+            const int i = first + k;
+            const long row = (long)abs(i) * S_NODES + j;
+            const float16 weight = along_r[k];
+            a = fma(weight, vload16(row, i < 0 ? opposite : here), a);
+            b = fma(weight, vload16(row, i < 0 ? here : opposite), b);
+        }
+        vstore16(a, j, e_here);
+        vstore16(b, j, e_opposite);
+    }
+}
+
+/* What CHUNK points or fewer add to a ring's X, Y, Z at four nodes of w, for both tiles */
+static void add_shares(const float16 (*line)[W_TERMS][2], const int points, const int m, __global const float *shares,
+                       float16 (*sum)[W_TERMS][2]) {
+    float16 part[3][4][2];
+    UNROLL for (int q = 0; q < 24; ++q) part[q / 8][q / 2 % 4][q % 2] = sum[q / 8][m + q / 2 % 4][q % 2];
+    for (int p = 0; p < points; ++p)
+        UNROLL for (int k = 0; k < 4; ++k) {
+            const float16 a = line[p][m + k][0], b = line[p][m + k][1];
+            UNROLL for (int c = 0; c < 3; ++c) {
+                const float16 share = shares[(p * 3 + c) * W_TERMS + m + k];
+                part[c][k][0] = fma(share, a, part[c][k][0]);
+                part[c][k][1] = fma(share, b, part[c][k][1]);
+            }
+        }
+    UNROLL for (int q = 0; q < 24; ++q) sum[q / 8][m + q / 2 % 4][q % 2] = part[q / 8][q / 2 % 4][q % 2];
+}
+
+/* The table of one ring, at the sixteen azimuths of a tile and those half a turn on. Work-items: rings of a group, tiles
+ * of half a turn, groups of rings.
  *
  *   spectrum  float[2 * tiles][radii][S_NODES][16]   E, as polar_spectrum.cl writes it
- *   table     float[rings][OUT][16 * 2 * tiles]      Chebyshev coefficients over w: X's, then Y's, then Z's
+ *   w_series  float[W_TERMS][W_TERMS]                Chebyshev coefficients from values at the nodes, [term][w node]
+ *   table     float[count][3][W_TERMS][16 * 2 * tiles]
  */
-__kernel void apply_operator(__global const float *spectrum, const int radii, __global const int4 *extent,
-                             __global const float *matrix, __global float *table) {
-    const int ring = get_global_id(0), tile = get_global_id(1), tiles = get_global_size(1), group = get_global_id(2);
-    const int first = extent[ring].x, count = extent[ring].y;
-    __global const float *row = matrix + ((long)extent[ring].z * GROUPS + (long)group * count * S_NODES) * GROUP;
+__kernel void apply_operator(__global const float *spectrum, const int radii, const int count,
+                             __global const Ring *rings, __global const int *place, __global const float *along_r,
+                             __global const float *along_s, __global const float *shares,
+                             __global const float *w_series, __global float *table) {
+    const int i = get_global_size(0) * get_global_id(2) + get_global_id(0);
+    const int tile = get_global_id(1), tiles = get_global_size(1);
+    if (i >= count) return;
+    const Ring ring = rings[i];
     __global const float *here = spectrum + (long)tile * radii * S_NODES * 16;
-    __global const float *opposite = spectrum + (long)((tile + tiles / 2) % tiles) * radii * S_NODES * 16;
-    float16 sum[GROUP];
-    UNROLL for (int o = 0; o < GROUP; ++o) sum[o] = 0.0f;
-    for (int i = first; i < first + count; ++i) {
-        __global const float *power = i < 0 ? opposite - (long)i * S_NODES * 16 : here + (long)i * S_NODES * 16;
-        for (int j = 0; j < S_NODES; ++j) {
-            const float16 e = vload16(j, power);
-            UNROLL for (int o = 0; o < GROUP; ++o) sum[o] = fma((float16)row[o], e, sum[o]);
-            row += GROUP;
+    __global const float *opposite = here + (long)tiles * radii * S_NODES * 16;
+
+    float16 sum[3][W_TERMS][2];
+    for (int c = 0; c < 3; ++c)
+        for (int m = 0; m < W_TERMS; ++m) sum[c][m][0] = sum[c][m][1] = 0.0f;
+    for (int from = ring.first; from < ring.first + ring.points; from += CHUNK) {
+        const int points = min(CHUNK, ring.first + ring.points - from);
+        float16 line[CHUNK][W_TERMS][2];
+        for (int p = 0; p < points; ++p) {
+            __global const float *weights = along_s + (long)(from + p) * S_NODES * W_TERMS;
+            if (ring.on_radii) {
+                const long at = (long)place[from + p] * S_NODES * 16;
+                for (int m = 0; m < W_TERMS; m += W_BLOCK)
+                    along_line_on_radius(here + at, opposite + at, weights + m, line[p] + m);
+            } else {
+                float e_here[16 * S_NODES], e_opposite[16 * S_NODES];
+                between_radii(here, opposite, place[from + p], along_r + (from + p) * ORDER, e_here, e_opposite);
+                for (int m = 0; m < W_TERMS; m += W_BLOCK)
+                    along_line_between_radii(e_here, e_opposite, weights + m, line[p] + m);
+            }
         }
+        for (int m = 0; m < W_TERMS; m += 4) add_shares(line, points, m, shares + (long)from * 3 * W_TERMS, sum);
     }
-    UNROLL for (int o = 0; o < GROUP; ++o)
-        if (group * GROUP + o < OUT)
-            vstore16(sum[o], tile, table + ((long)ring * OUT + group * GROUP + o) * tiles * 16);
+    for (int c = 0; c < 3; ++c)
+        for (int k = 0; k < W_TERMS; ++k) {
+            float16 a = 0.0f, b = 0.0f;
+            for (int m = 0; m < W_TERMS; ++m) {
+                a = fma((float16)w_series[k * W_TERMS + m], sum[c][m][0], a);
+                b = fma((float16)w_series[k * W_TERMS + m], sum[c][m][1], b);
+            }
+            __global float *row = table + (((long)i * 3 + c) * W_TERMS + k) * 32 * tiles;
+            vstore16(a, tile, row);
+            vstore16(b, tile + tiles, row);
+        }
 }

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from kernels import polar as kernel
-from kernels.polar import RingQuadratures
+from kernels.spectral_operator import LinePoints, RingQuadratures, w_nodes
 from pipeline import series, spectrum
 from pipeline.config import Config, LaserLine, PolarLayout, Spectrum
 from pipeline.optics import brdf
@@ -18,7 +17,7 @@ from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm
 from pipeline.spectrum import PolarSpectrum
 from pipeline.stack import Stack, crop_to_window
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import plan, polar, quadrature
+from pipeline.tables import plan, polar, quadrature, spectral_integral
 from pipeline.tables.plan import Budget, Plan
 
 # what the terms, nodes and wavelengths of every polar table here are chosen for; its grid is given
@@ -83,19 +82,24 @@ class Setting:
         lit = partial(brdf.illumination, self.config.material, light, self.sigma_um)
         return quadrature.choose(lit, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
 
+    @property
+    def points(self) -> LinePoints:
+        """Where the rings take E."""
+        s_max, rho = spectrum.s_max(self.lambda_min_nm), self.plan.rings.rho()
+        return spectral_integral.line_points(self.radius_per_um, self.plan.s_nodes, s_max, rho, self.rules)
+
     def table(self, made: PolarSpectrum, light: Spectrum) -> polar.PolarTable:
         reflectance = partial(brdf.spectral_reflectance, self.config.material, light)
         return polar.build(made, self.plan.rings, self.rules_of(light), self.plan.w_terms, reflectance)
 
     def samples(self, made: PolarSpectrum) -> NDArray[np.float64]:
         """The table's samples (rings, 3, w nodes, azimuths) before splines are put through them."""
-        shape = (self.plan.rings.count, 3, self.plan.w_terms, self.plan.azimuths.count)
         rho = self.plan.rings.rho()
-        terms = kernel.integrate(
+        terms = spectral_integral.integrate(
             made.values, made.radius_per_um, made.s_max_per_um, rho, self.rules, self._reflectance
-        ).reshape(shape)
+        )
         # T_k at the nodes of w, (w node, k)
-        x = 2.0 * kernel.w_nodes(self.plan.w_terms) - 1.0
+        x = 2.0 * w_nodes(self.plan.w_terms) - 1.0
         cosines = np.cos(np.arange(self.plan.w_terms) * np.arccos(x)[:, None])
         return np.asarray(np.einsum("wk,rcka->rcwa", cosines, terms))
 
@@ -117,7 +121,7 @@ class Setting:
         w is negative, and J_n(-z) = (-1)^n J_n(z).
         """
         n = np.arange(self.plan.terms)
-        w = kernel.w_nodes(self.plan.w_terms) * np.sqrt(max(4.0 - self.plan.rings.rho()[ring] ** 2, 0.0))
+        w = w_nodes(self.plan.w_terms) * np.sqrt(max(4.0 - self.plan.rings.rho()[ring] ** 2, 0.0))
         rule = self.rule_of_ring(ring)
         phase = 2.0 * pi / (1e-3 * rule.lambda_nm)[:, None] * w * self.field.half_range_um
         amplitudes = np.where(n == 0, 1.0, 2.0) * (-1j) ** n * jv(n, phase[..., None])

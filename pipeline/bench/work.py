@@ -8,10 +8,9 @@ from math import log2
 
 import numpy as np
 
-from kernels import polar as kernel
+from kernels.spectral_operator import ORDER
 from pipeline.bench.machine import Precision, Work
 from pipeline.bench.setting import Setting
-from pipeline.optics.geometry import Array
 from pipeline.spectrum import PolarSpectrum
 from pipeline.stack import Stack
 from pipeline.surface.heightfield import HeightField
@@ -52,26 +51,27 @@ def _pairs_in_band(made: PolarSpectrum) -> int:
 
 
 def build_operator(setting: Setting) -> Work:
-    """At every wavelength: cardinal functions at the nodes of w, their series in w, spread over the radii near."""
-    s, w, order = setting.plan.s_nodes, setting.plan.w_terms, kernel.ORDER
+    """At every point: cardinal functions at the nodes of w, the radii about it; wavelengths over the points."""
+    s, w = setting.plan.s_nodes, setting.plan.w_terms
+    points, between = _points(setting)
     wavelengths = float(np.sum(setting.rules.count))
-    flops = 2.0 * wavelengths * (s * s * w + s * w * w + order * s * 3 * w)
-    return Work("build_operator", "single", flops, 4.0 * 3 * w * s * np.sum(_radii_of_rings(setting)))
+    flops = 2.0 * (points * s * s * w + between * ORDER + wavelengths * ORDER * 3 * w)
+    return Work("build_operator", "single", flops, 4.0 * points * w * (s + 3))
 
 
 def apply_operator(setting: Setting, made: PolarSpectrum, table: PolarTable) -> Work:
-    """Every ring's matrix over its radii and nodes in s, for every azimuth."""
-    outputs, inputs = 3 * setting.plan.w_terms, setting.plan.s_nodes * float(np.sum(_radii_of_rings(setting)))
-    flops = 2.0 * outputs * setting.plan.azimuths.count * inputs
-    moved = made.values.nbytes + 4.0 * outputs * inputs + table.values.nbytes
-    return Work("apply_operator", "single", flops, moved)
+    """At every point: E over r where it lies between radii, then over s, into X, Y, Z; w's series at last."""
+    s, w = setting.plan.s_nodes, setting.plan.w_terms
+    points, between = _points(setting)
+    each = between * ORDER * s + points * (s * w + 3 * w) + setting.plan.rings.count * 3 * w * w
+    moved = made.values.nbytes + 4.0 * points * w * (s + 3) + table.values.nbytes
+    return Work("apply_operator", "single", 2.0 * each * setting.plan.azimuths.count, moved)
 
 
-def _radii_of_rings(setting: Setting) -> Array:
-    """Radii that every ring's matrix reads, (rings,)."""
-    rho, nodes = setting.plan.rings.rho(), setting.plan.s_nodes
-    extents = kernel.extents(setting.radius_per_um, rho, setting.rules, nodes)
-    return np.asarray(extents[:, 1], dtype=np.float64)
+def _points(setting: Setting) -> tuple[float, float]:
+    """Points of all rings, and those of them that lie between radii."""
+    count = setting.points.count
+    return float(count.sum()), float(count[~setting.points.on_radii].sum())
 
 
 def splines(table: PolarTable) -> Work:

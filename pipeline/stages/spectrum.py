@@ -110,4 +110,4 @@ def load(artifact: Artifact) -> spectrum.PolarSpectrum:
     )
 
 
-SPECTRUM = Stage("spectrum", 2, ("surface",), _parameters, _produce)
+SPECTRUM = Stage("spectrum", 3, ("surface",), _parameters, _produce)

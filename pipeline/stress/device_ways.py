@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from kernels import polar as device
+from kernels.polar_spectrum import LANES
 from pipeline import series, spectrum, stack
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
@@ -55,10 +55,10 @@ def power_spectrum(cell: Cell, field: HeightField) -> list[Reading]:
     """E of the float32 Chebyshev stack at some of its own nodes, where nothing is interpolated."""
     terms = series.chebyshev_order(series.largest_phase(field.half_range_um, LAMBDA_MIN_NM), CUT) + 1
     # few sizes, so that few kernels are compiled; what is too many adds terms that are nothing
-    terms = device.LANES * 2 ** int(np.ceil(np.log2(terms / device.LANES).clip(0.0)))
+    terms = LANES * 2 ** int(np.ceil(np.log2(terms / LANES).clip(0.0)))
     radius = spectrum.radii(cell.sigma_um, series.W_MAX / (1e-3 * LAMBDA_MIN_NM))
     built = spectrum.chebyshev_stack(field, cell.sigma_um, float(radius[-1]), terms, CUT)
-    half = pi * np.arange(device.LANES) / device.LANES
+    half = pi * np.arange(LANES) / LANES
     values = spectrum.gather(built, half, radius, LAMBDA_MIN_NM, _S_NODES)
     s = spectrum.s_nodes(_S_NODES, spectrum.s_max(LAMBDA_MIN_NM))
     turn, i, j, lane = _nodes(cell, len(radius))
@@ -72,7 +72,7 @@ def _nodes(cell: Cell, radii: int) -> tuple[np.ndarray, ...]:
     """Which of E's nodes are held against the truth: (half turn, radius, s node, azimuth), each (nodes,)."""
     rng = np.random.default_rng(SEED)
     count = int(np.clip(2.0 * MOST_WORK / (cell.shape[0] * cell.shape[1]), 12, 60))
-    chosen = [rng.integers(n, size=count) for n in (2, radii, _S_NODES, device.LANES)]
+    chosen = [rng.integers(n, size=count) for n in (2, radii, _S_NODES, LANES)]
     # both ends of r under the largest and the smallest s
     chosen[1][:4], chosen[2][:4] = (0, 0, radii - 1, radii - 1), (0, _S_NODES - 1, 0, _S_NODES - 1)
     return tuple(chosen)

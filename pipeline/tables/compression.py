@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import polar
+from kernels import cubic_spline
 from pipeline.config import Scene
 from pipeline.directions import random_pairs
 from pipeline.optics import geometry
@@ -133,7 +133,7 @@ def flattened(textures: Textures) -> Textures:
     """The same over the envelope that fits them best, for a range that half floats hold."""
     rho, nodes = textures.grid.rings.rho(), samples(textures.values)
     envelope = _fit(rho, nodes)
-    values = polar.spline_coefficients(nodes / envelope.at(rho).astype(np.float32)[:, None, None])
+    values = cubic_spline.coefficients(nodes / envelope.at(rho).astype(np.float32)[:, None, None])
     return replace(textures, values=values, envelope=envelope)
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import partial
 
-from kernels.polar import RingQuadratures
+from kernels.spectral_operator import RingQuadratures
 from pipeline import spectrum
 from pipeline.config import LaserLine, Material, Spectrum
 from pipeline.optics import brdf

@@ -10,7 +10,7 @@ from math import ceil
 
 import numpy as np
 
-from kernels import polar as device
+from kernels.polar_spectrum import LANES
 from pipeline import series, spectrum
 from pipeline.config import LaserLine, PolarLayout, Scene, Spectrum
 from pipeline.optics.spectra import shortest_wavelength_nm
@@ -85,7 +85,7 @@ def make(
     amplitude = AMPLITUDE_SHARE * budget.delta_e
     wanted = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
     # whole vectors of terms cost the same and are shared with the device without a copy
-    terms = device.LANES * ceil(wanted / device.LANES)
+    terms = LANES * ceil(wanted / LANES)
     nodes = series.chebyshev_order(z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
     light = _probing_light(light, layout)
     line = isinstance(light.illuminant, LaserLine)

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import polar
-from kernels.polar import RingQuadratures
+from kernels import cubic_spline
+from kernels.spectral_operator import RingQuadratures, w_nodes
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
 from pipeline.spectrum import PolarSpectrum
+from pipeline.tables import spectral_integral
 from pipeline.tables.polar_grid import PolarGrid, Rings
 
 # at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
@@ -57,17 +58,16 @@ def build(
     """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
     rho = rings.rho()
     reflected = at_nodes(reflectance, rho, quadratures, w_terms)
-    samples = polar.integrate(
+    samples = spectral_integral.integrate(
         spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um, rho, quadratures, reflected
     )
-    values = polar.spline_coefficients(samples)
-    shape = (rings.count, 3, w_terms, spectrum.azimuths.count)
-    return PolarTable(values.reshape(shape), PolarGrid(rings, spectrum.azimuths))
+    values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
+    return PolarTable(values, PolarGrid(rings, spectrum.azimuths))
 
 
 def at_nodes(reflectance: Reflectance, rho: Array, quadratures: RingQuadratures, w_terms: int) -> Array:
     """R (nodes of all rings' rules, w terms). (u, v, w) = -wi - wr, so cos(half angle) = sqrt(rho^2 + w^2) / 2."""
-    shares = polar.w_nodes(w_terms)
+    shares = w_nodes(w_terms)
     found = []
     for ring, first, count in zip(rho, quadratures.first, quadratures.count, strict=True):
         w = shares * np.sqrt(max(4.0 - ring**2, 0.0))
@@ -91,7 +91,7 @@ def look_up(table: PolarTable, uvw: Array) -> Array:
     inside = ring <= rings.count - 1 + 1e-6
     place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
     flat = table.values.reshape(rings.count, -1, azimuths.count)
-    found = polar.look_up(flat, *place).astype(np.float64)
+    found = cubic_spline.look_up(flat, *place).astype(np.float64)
     found[~inside] = np.nan
     return found
 

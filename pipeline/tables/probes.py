@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from kernels import polar as device
 from pipeline import spectrum
 from pipeline.config import Material, Scene
 from pipeline.directions import random_pairs
@@ -10,7 +9,7 @@ from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import trapezoid
-from pipeline.tables import polar
+from pipeline.tables import polar, spectral_integral
 from pipeline.tables.ingredients import Ingredients
 from pipeline.tables.scattering import probing_angles
 
@@ -53,8 +52,7 @@ def _exact(of: Ingredients, half_turn: Array, rho: Array, w: Array) -> Array:
     rules = of.rules(rho)
     reflected = polar.at_nodes(polar.grey, rho, rules, of.w_terms + _SPARE_W_TERMS)
     s_max = spectrum.s_max(of.lambda_min_nm)
-    terms = device.integrate(found, of.radius_per_um, s_max, rho, rules, reflected)
-    terms = terms.reshape(len(rho), 3, -1, w.shape[1])
+    terms = spectral_integral.integrate(found, of.radius_per_um, s_max, rho, rules, reflected)
     x = polar.w_position(rho[:, None], w)
     cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
     return np.asarray(np.einsum("rcka,rak->rac", terms, cosines))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kernels.polar import RingQuadratures as RingQuadratures
+from kernels.spectral_operator import RingQuadratures as RingQuadratures
 from pipeline.config import FINE_STEP_NM
 from pipeline.errors import AccuracyError
 from pipeline.optics.geometry import Array

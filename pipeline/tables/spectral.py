@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.polar import chebyshev
+from kernels.spectral_operator import chebyshev
 from pipeline.optics.geometry import Array
 from pipeline.spectrum import PolarSpectrum
 

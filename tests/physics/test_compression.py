@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kernels.polar import spline_coefficients
+from kernels import cubic_spline
 from pipeline import spectrum
 from pipeline.config import Material, Spectrum
 from pipeline.evaluate import Map
@@ -52,7 +52,7 @@ def test_samples_are_what_coefficients_stand_for() -> None:
     wanted = noise(24, 8, 96).astype(np.float32)
     # the first ring is one point, and the same seen from its other side
     wanted[0] = wanted[0, :, :1]
-    np.testing.assert_allclose(samples(spline_coefficients(wanted.copy())), wanted, atol=3e-6)
+    np.testing.assert_allclose(samples(cubic_spline.coefficients(wanted.copy())), wanted, atol=3e-6)
 
 
 def test_samples_are_the_look_up_at_the_nodes() -> None:
@@ -100,7 +100,7 @@ def smooth_table(fall: Array) -> PolarTable:
     """A table whose rings fall off as `fall` and that turns slowly with the azimuth."""
     phi = GRID.azimuths.angles()
     turning = 2.0 + np.cos(2.0 * phi)[:, None] * np.sin(np.arange(3 * W_TERMS))
-    made = spline_coefficients(np.ascontiguousarray(fall[:, None, None] * turning.T, dtype=np.float32))
+    made = cubic_spline.coefficients(np.ascontiguousarray(fall[:, None, None] * turning.T, dtype=np.float32))
     return PolarTable(made.reshape(24, 3, W_TERMS, 96), GRID)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import spline_filter1d
 
-from kernels import polar as device
+from kernels import cubic_spline
 from pipeline.tables.polar import PolarTable, look_up
 from pipeline.tables.polar_grid import Azimuths, PolarGrid, Rings
 
@@ -46,7 +46,7 @@ def test_rings_run_from_zero_to_the_rim_and_are_their_own_index() -> None:
 def test_spline_coefficients_are_those_of_an_independent_filter() -> None:
     rng = np.random.default_rng(1)
     samples = rng.random((40, 4, 64), np.float32)
-    found = device.spline_coefficients(samples.copy())
+    found = cubic_spline.coefficients(samples.copy())
     around = spline_filter1d(samples.astype(float), 3, axis=2, mode="grid-wrap")
     # beyond the first ring lies the opposite half turn
     both = np.concatenate([np.roll(around[:0:-1], 32, axis=2), around])
@@ -62,7 +62,7 @@ def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
     samples[:, 0], samples[:, 4] = values, 2.0 * values
     # |w| / w_max = (T_0 + T_1) / 2
     samples[:, 8] = samples[:, 9] = 0.5 * values
-    coefficients = device.spline_coefficients(samples)
+    coefficients = cubic_spline.coefficients(samples)
     return PolarTable(coefficients.reshape(rings.count, 3, 4, azimuths.count), PolarGrid(rings, azimuths))
 
 

@@ -5,7 +5,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from kernels import polar as device
 from pipeline import series, spectrum
 from pipeline.config import LaserLine, Material, Spectrum
 from pipeline.errors import AccuracyError
@@ -13,7 +12,7 @@ from pipeline.optics import brdf
 from pipeline.optics.spectra import trapezoid
 from pipeline.reference import Reference, power_direct
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import polar, quadrature, spectral
+from pipeline.tables import polar, quadrature, spectral, spectral_integral
 from pipeline.tables.polar_grid import Azimuths, Rings
 
 SIGMA = 2.0
@@ -74,21 +73,28 @@ def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
 
 
 @pytest.mark.parametrize("w_terms", [8, 12])
-def test_a_ring_holds_the_integral_over_wavelengths(w_terms: int) -> None:
-    """Rings at the origin, where radii are mirrored, and out to the rim; 12 terms in |w| take two groups of sums."""
+@pytest.mark.parametrize(("range_nm", "tolerance"), [((380.0, 780.0), 6e-3), ((500.0, 560.0), 2.5e-2)])
+def test_a_ring_holds_the_integral_over_wavelengths(
+    w_terms: int, range_nm: tuple[float, float], tolerance: float
+) -> None:
+    """Rings at the origin, where radii are mirrored, and out to the rim; nodes of w by eight and by four.
+
+    A narrow range averages less of what the radii's distance leaves.
+    """
     field = rough()
-    power = spectrum_of(field, Azimuths(32, 0.8, 0.2))
+    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
     rho = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.9, 2.0])
-    rule = trapezoid(LIGHT, 5.0)
-    terms = device.integrate(
+    rule = trapezoid(Spectrum(range_nm=range_nm), 5.0)
+    terms = spectral_integral.integrate(
         power.values,
         power.radius_per_um,
         power.s_max_per_um,
         rho,
         quadrature.uniform(rule, len(rho)),
         ones(rule, len(rho), w_terms),
-    ).reshape(len(rho), 3, w_terms, 32)
-    reference = Reference(field, SIGMA, 380.0)
+    )
+    assert terms.shape == (len(rho), 3, w_terms, 32)
+    reference = Reference(field, SIGMA, range_nm[0])
     for share in (0.05, 0.5, 0.97):
         cosines = np.cos(np.arange(w_terms) * np.arccos(2.0 * share - 1.0))
         found = np.einsum("rcka,k->rac", terms, cosines)
@@ -101,7 +107,29 @@ def test_a_ring_holds_the_integral_over_wavelengths(w_terms: int) -> None:
         exact = exact.reshape(found.shape)
         # at the rim |w| vanishes and with it all light but the mirror's
         level = exact.mean(axis=(1, 2), keepdims=True) + 1e-7
-        assert np.max(np.abs(found - exact) / (exact + level)) < 6e-3
+        assert np.max(np.abs(found - exact) / (exact + level)) < tolerance
+
+
+@pytest.mark.parametrize("height", [0.05, 0.6])
+def test_points_on_radii_and_between_them_give_one_integral(height: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every ring that is allowed on radii, forced between them, where interpolation over r is the old one."""
+    power = spectrum_of(rough(height=height), Azimuths(32, 0.8, 0.2))
+    rho = np.linspace(0.0, 2.0, 41)
+    rules = quadrature.uniform(trapezoid(LIGHT, 5.0), len(rho))
+    of = power.radius_per_um, power.s_max_per_um, rho, rules
+    shape = power.values.shape[2]
+    points = spectral_integral.line_points(of[0], shape, *of[1:])
+    assert points.on_radii[-3:].all()
+    assert not points.on_radii[:2].any()
+    assert np.all(points.count >= 8)
+    mixed = spectral_integral.integrate(power.values, *of, np.ones((41 * 81, 8)))
+    monkeypatch.setattr(spectral_integral, "_STEP_ON_RADII", 0.0)
+    monkeypatch.setattr(spectral_integral, "_STEP_IN_RADII", 0.1)
+    assert not spectral_integral.line_points(of[0], shape, *of[1:]).on_radii[:-1].any()
+    between = spectral_integral.integrate(power.values, *of, np.ones((41 * 81, 8)))
+    level = np.sqrt(np.mean(between.astype(np.float64) ** 2, axis=(2, 3), keepdims=True))
+    np.testing.assert_array_less(np.abs(mixed - between) / level, 2e-2)
+    assert np.sqrt(np.mean(((mixed - between) / level) ** 2)) < 2e-3
 
 
 def test_wavelengths_follow_the_radius() -> None:

@@ -1,0 +1,48 @@
+"""Host side of the kernels that put cubic B-splines through a polar table's samples, and look them up.
+
+Layouts as stated in opencl/cubic_spline.cl.
+"""
+
+import numpy as np
+
+from kernels import device
+from kernels.diffraction import fourth_column
+from kernels.polar_spectrum import LANES
+
+_RINGS = 32  # of a column that one work-item filters
+
+
+def coefficients(table: np.ndarray) -> np.ndarray:
+    """Cubic B-spline coefficients of a table (rings, outputs, azimuths) of samples, in its place."""
+    rings, outputs, azimuths = table.shape
+    program = _program(outputs)
+    between = device.result_buffer(table.nbytes)
+    buffer = device.shared(table)
+    program.launch("filter_azimuths", (outputs, rings), buffer, np.int32(azimuths), between)
+    blocks = azimuths // LANES, -(-rings // _RINGS), outputs
+    program.launch("filter_rings", blocks, between, np.int32(rings), buffer)
+    return device.settle(buffer, table)
+
+
+def look_up(table: np.ndarray, ring: np.ndarray, azimuth: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """X, Y, Z float32 (directions, 3) of spline coefficients (rings, outputs, azimuths).
+
+    `ring` in 0 .. rings - 1 and `azimuth` in 0 .. azimuths, fractional, in samples; `x` = 2 |w| / w_max - 1.
+    """
+    rings, outputs, azimuths = table.shape
+    # whole and fraction apart: together they would not fit float32's digits
+    below = np.stack([np.minimum(np.floor(ring), rings - 2), np.floor(azimuth)], axis=-1)
+    place = fourth_column(np.stack([ring - below[:, 0], azimuth - below[:, 1], x], axis=-1))
+    out = np.empty((len(ring), 4), np.float32)
+    cells, places, result = (
+        device.upload(below.astype(np.int32)),
+        device.upload(place.astype(np.float32)),
+        device.result_buffer(out.nbytes),
+    )
+    sizes = np.int32(rings), np.int32(azimuths)
+    _program(outputs).launch("look_up", (len(ring),), device.lent(table), *sizes, cells, places, result)
+    return device.download(result, out)[:, :3]
+
+
+def _program(outputs: int) -> device.Program:
+    return device.program(("cubic_spline.cl",), {"OUT": outputs, "W_TERMS": outputs // 3, "RINGS": _RINGS})

@@ -1,0 +1,84 @@
+"""The spectral integral of E(r, phi, s) on rings, and the points on each ring's line at which it takes E.
+
+At a ring rho and a w, wavelengths ask for E at r = rho kappa and s = 2 pi |w| kappa, kappa = 1 / lambda. E is taken
+at points kappa_p, and every wavelength is interpolated from the points about it. Points on radii of E cost half as
+much; the rings near the mirror direction need points between: there, a step of r is a long way in s.
+"""
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import spectral_operator
+from kernels.spectral_operator import ORDER, LinePoints
+from pipeline.optics.geometry import Array
+from pipeline.tables.quadrature import RingQuadratures
+
+# how far a step may carry s, in mean distances of E's nodes in s: E cannot turn faster than they follow
+_STEP_ON_RADII, _STEP_BETWEEN = 0.5, 0.25
+# distances of points between radii, in distances of radii: E there is a polynomial in pieces, not one
+_STEP_IN_RADII = 0.7
+# (s / s_max - 1) nodes^2 = g at the last radius, beyond the shortest wavelength: the tail of E's series in s grows to
+# cosh(2 sqrt(g)) times what it was, 1500; Lagrange's weight out there is at most 2.4e-3
+_MOST_BEYOND = 16.0
+
+
+def integrate(
+    spectrum: NDArray[np.float32],
+    radius_per_um: Array,
+    s_max_per_um: float,
+    rho: Array,
+    quadratures: RingQuadratures,
+    reflectance: Array,
+) -> NDArray[np.float32]:
+    """XYZ / (C cos ti) as Chebyshev terms of |w|, (rings, 3, w terms, azimuths).
+
+    `spectrum` is E as `PolarSpectrum` keeps it, `reflectance` R (nodes of all rings' rules, w terms) at `w_nodes`.
+    """
+    points = line_points(radius_per_um, spectrum.shape[2], s_max_per_um, rho, quadratures)
+    terms = spectral_operator.integrate(spectrum, radius_per_um, s_max_per_um, rho, points, quadratures, reflectance)
+    return terms.reshape(len(rho), 3, reflectance.shape[1], -1)
+
+
+def line_points(
+    radius_per_um: Array, s_nodes: int, s_max_per_um: float, rho: Array, quadratures: RingQuadratures
+) -> LinePoints:
+    """Points of every ring, over all of its wavelengths.
+
+    `radius_per_um` of E ascends from 0, with ORDER / 2 radii beyond the farthest wavelength of every ring.
+    """
+    low, high = (
+        1.0 / quadratures.lambda_um[i] for i in (quadratures.first + quadratures.count - 1, quadratures.first)
+    )
+    first, last = _about(radius_per_um, rho * low), _about(radius_per_um, rho * high) + ORDER - 1
+    spacing = np.diff(radius_per_um)
+    # of s, in distances of its nodes, for a step of kappa; of kappa, for a step of r
+    s_rate = 2.0 * pi * np.sqrt(np.maximum(4.0 - rho**2, 0.0)) / s_max_per_um * (s_nodes - 1)
+    kappa_rate = 1.0 / np.maximum(rho, np.finfo(np.float32).tiny)
+    beyond = s_rate / (s_nodes - 1) * radius_per_um[last] * kappa_rate - 1.0
+    on_radii = (
+        (first >= 0)
+        & (s_rate * kappa_rate * spacing[last - 1] <= _STEP_ON_RADII)
+        & (beyond * s_nodes**2 <= _MOST_BEYOND)
+    )
+    # of points between radii: the rates at which E turns along r and along s add up; a line's points stay above 0
+    step = 1.0 / (rho / (_STEP_IN_RADII * spacing[np.abs(first)]) + s_rate / _STEP_BETWEEN + ORDER / high)
+    between = np.maximum(ORDER, np.ceil((high - low) / step).astype(int) + 1)
+    count = np.where(on_radii, last + 1 - first, between)
+
+    begin = np.cumsum(count) - count
+    ring = np.repeat(np.arange(len(rho)), count)
+    i = np.arange(len(ring)) - begin[ring]
+    kappa = high[ring] - (count[ring] - 1 - i) * step[ring]
+    place = np.where(on_radii[ring], first[ring] + i, _about(radius_per_um, rho[ring] * kappa))
+    on = on_radii[ring]
+    kappa[on] = radius_per_um[place[on]] / rho[ring[on]]
+    return LinePoints(kappa, place, begin, count, on_radii)
+
+
+def _about(radius_per_um: Array, r: Array) -> np.ndarray:
+    """The first of the ORDER radii about r, negative near the origin."""
+    half = ORDER // 2
+    below = np.searchsorted(radius_per_um, r, side="right") - 1
+    return np.clip(below, 0, len(radius_per_um) - 1 - half) - (half - 1)
