@@ -6,6 +6,8 @@ from kernels import device
 from kernels.diffraction import DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
+_MOST_TOGETHER = 6  # nodes in s whose four sums stay in registers
+_RADII = 8  # neighbours, whose windows share most of what they read
 
 
 def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarray, series: np.ndarray) -> np.ndarray:
@@ -15,25 +17,29 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     follows it in E, tile by tile. `series` (terms, s nodes) holds (2 - [n = 0]) J_n(s H).
     """
     terms, nodes = series.shape
-    blocks, s_blocks = stack.constants["BLOCKS"], -(-nodes // LANES)
+    s_block = -(-nodes // -(-nodes // _MOST_TOGETHER))
     # i^n, n = 2 m or 2 m + 1: the kernel keeps even and odd terms apart, which leaves (-1)^m
     signs = (-1.0) ** (np.arange(terms) // 2)
-    padded = np.zeros((LANES * blocks, LANES * s_blocks), np.float32)
-    padded[:terms, :nodes] = signs[:, None] * series
+    padded = np.zeros((LANES * stack.constants["BLOCKS"], nodes), np.float32)
+    padded[:terms] = signs[:, None] * series
     tiles = azimuth_rad.reshape(-1, LANES)
     directions = np.stack([np.cos(tiles), np.sin(tiles)], axis=1)
     constants = {key: stack.constants[key] for key in ("BLOCKS", "REACH_X", "REACH_Y")}
-    program = device.program(("polar_spectrum.cl",), {**constants, "S_BLOCKS": s_blocks, "S_NODES": nodes})
-    inputs = [device.upload(a) for a in (radius_per_um, directions, padded)]
+    constants |= {"S_NODES": nodes, "S_BLOCK": s_block, "RADII": _RADII}
+    program = device.program(("polar_spectrum.cl",), constants)
+    radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))
     out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
     result = device.shared(out)
     program.launch(
         "polar_spectrum",
-        (len(radius_per_um), len(tiles)),
+        (-(-len(radius_per_um) // _RADII), len(tiles)),
         stack.buffer,
         stack.decay,
         stack.grid,
-        *inputs,
+        radius,
+        np.int32(len(radius_per_um)),
+        direction,
+        terms_at_s,
         *(np.float64(f) for f in stack.band_per_um),
         result,
     )

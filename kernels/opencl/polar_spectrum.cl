@@ -10,15 +10,15 @@
  *   decay    float[2 * REACH_X + 1], then [2 * REACH_Y + 1]   the window's transform at j spacings from its peak
  *   radius   double[radii]                           r, 1/um
  *   azimuth  double[tiles][2][16]                    cos phi, then sin phi, of half a turn
- *   series   float[16 * BLOCKS][16 * S_BLOCKS]       (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last term
+ *   series   float[16 * BLOCKS][S_NODES]             (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last term
  *   spectrum float[2 * tiles][radii][S_NODES][16]    E: the tiles of the half turn, then those half a turn on;
  *                                                    azimuths of a tile side by side
  *   fx_max, fy_max                                   the scan's band, 1/um: beyond it nothing is known and E = 0
  *
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
- * the point. One work-item, one radius and the sixteen azimuths of a tile.
+ * the point. One work-item, RADII radii and the sixteen azimuths of a tile.
  *
- * Set by the host: BLOCKS of 16 terms, S_NODES and S_BLOCKS of 16 of them, REACH_X and REACH_Y.
+ * Set by the host: BLOCKS of 16 terms, S_NODES and S_BLOCK of them, RADII, REACH_X and REACH_Y.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
@@ -26,6 +26,16 @@
 #define TAPS_X (2 * REACH_X + 1)
 #define TAPS_Y (2 * REACH_Y + 1)
 #define CELL (32 * BLOCKS)
+
+/* E is larger than caches: lines written past them need not be read first */
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_nontemporal_store)
+#define STORE(value, to) __builtin_nontemporal_store(value, (__global float16 *)(to))
+#endif
+#endif
+#ifndef STORE
+#define STORE(value, to) vstore16(value, 0, to)
+#endif
 
 typedef struct {
     double dfx, dfy;            /* spacing of the DFT's frequencies, 1/um */
@@ -48,24 +58,24 @@ static void window_weights(const float16 d, const float df, const float inverse,
     }
 }
 
-/* F_n(f) for all n: four chains of sums for each part hide the latency of the additions */
-static void gather(__global const float *corner, const int columns, const float *along_x, const float *along_y,
-                   float *re, float *im) {
-    for (int b = 0; b < BLOCKS; ++b) {
-        float16 sum_re[4] = {0.0f, 0.0f, 0.0f, 0.0f}, sum_im[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-        /* written out as well, a wide window's taps would take the compiler minutes */
-        _Pragma("nounroll") for (int t = 0; t < TAPS_Y; ++t) {
-            __global const float *cell = corner + (long)t * columns * CELL + 16 * b;
-            const float row = along_y[16 * t];
-            UNROLL for (int s = 0; s < TAPS_X; ++s) {
-                const float16 weight = along_x[16 * s] * row;
-                sum_re[s & 3] = fma(weight, vload16(0, cell + s * CELL), sum_re[s & 3]);
-                sum_im[s & 3] = fma(weight, vload16(0, cell + s * CELL + 16 * BLOCKS), sum_im[s & 3]);
-            }
+/* F_n(f) of one block of 16 terms: the window along x, row by row, then along y */
+static void gather(__global const float *corner, const int columns, const float16 *along_x, const float *along_y,
+                   float16 *re, float16 *im) {
+    float16 sum_re = 0.0f, sum_im = 0.0f;
+    /* written out as well, a wide window's rows would take the compiler minutes */
+    _Pragma("nounroll") for (int t = 0; t < TAPS_Y; ++t) {
+        __global const float *cell = corner + (long)t * columns * CELL;
+        float16 row_re = 0.0f, row_im = 0.0f;
+        UNROLL for (int s = 0; s < TAPS_X; ++s) {
+            row_re = fma(along_x[s], vload16(0, cell + s * CELL), row_re);
+            row_im = fma(along_x[s], vload16(0, cell + s * CELL + 16 * BLOCKS), row_im);
         }
-        vstore16((sum_re[0] + sum_re[1]) + (sum_re[2] + sum_re[3]), b, re);
-        vstore16((sum_im[0] + sum_im[1]) + (sum_im[2] + sum_im[3]), b, im);
+        const float16 weight = along_y[16 * t];
+        sum_re = fma(weight, row_re, sum_re);
+        sum_im = fma(weight, row_im, sum_im);
     }
+    *re = sum_re;
+    *im = sum_im;
 }
 
 /* rows and columns of sixteen vectors change places: halves, quarters, pairs and single lanes in turn */
@@ -95,58 +105,93 @@ static void transpose(float16 *m) {
     }
 }
 
-__kernel void polar_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
-                             __global const double *radius, __global const double *azimuth,
-                             __global const float *series, const double fx_max, const double fy_max,
-                             __global float *spectrum) {
-    const int i = get_global_id(0), radii = get_global_size(0), tile = get_global_id(1);
-    __global float *here = spectrum + ((long)tile * radii + i) * 16 * S_NODES;
-    __global float *opposite = here + (long)get_global_size(1) * radii * 16 * S_NODES;
+/* Where the window lies for sixteen azimuths of a radius: its weights, its first cells; turned: the opposite of f is
+ * gathered, for the stack holds the half plane fx >= 0; known: within the scan's band */
+typedef struct {
+    float16 along_x[TAPS_X], along_y[TAPS_Y];
+    int16 row, column, turned, known;
+} Window;
 
-    double16 fx = radius[i] * vload16(2 * tile, azimuth), fy = radius[i] * vload16(2 * tile + 1, azimuth);
-    /* the stack holds the half plane fx >= 0 */
+static void place_window(const Grid grid, __global const float *decay, double16 fx, double16 fy, const double fx_max,
+                         const double fy_max, Window *window) {
     const double16 turn = select((double16)1.0, (double16)-1.0, fx < 0.0);
     fx *= turn;
     fy *= turn;
-    const int16 known = convert_int16(fx <= fx_max && fabs(fy) <= fy_max);
-    const double16 x = rint(fx / grid.dfx), y = rint(fy / grid.dfy);
-    float16 along_x[TAPS_X], along_y[TAPS_Y];
-    window_weights(convert_float16(fx - x * grid.dfx), grid.dfx, grid.inverse_2_variance, decay, REACH_X, along_x);
-    window_weights(convert_float16(fy - y * grid.dfy), grid.dfy, grid.inverse_2_variance, decay + TAPS_X, REACH_Y, along_y);
-    const int16 row = convert_int16(y) - REACH_Y + grid.row_zero, column = convert_int16(x) - REACH_X + grid.column_zero;
+    const double16 x = rint(fx * (1.0 / grid.dfx)), y = rint(fy * (1.0 / grid.dfy));
+    window_weights(convert_float16(fx - x * grid.dfx), grid.dfx, grid.inverse_2_variance, decay, REACH_X, window->along_x);
+    window_weights(convert_float16(fy - y * grid.dfy), grid.dfy, grid.inverse_2_variance, decay + TAPS_X, REACH_Y, window->along_y);
+    window->row = convert_int16(y) - REACH_Y + grid.row_zero;
+    window->column = convert_int16(x) - REACH_X + grid.column_zero;
+    window->turned = convert_int16(turn < 0.0);
+    window->known = convert_int16(fx <= fx_max && fabs(fy) <= fy_max);
+}
 
-    float16 ahead[S_BLOCKS][16], behind[S_BLOCKS][16];
-    for (int lane = 0; lane < 16; ++lane) {
-        float re[16 * BLOCKS], im[16 * BLOCKS];
-        const int lit = ((const int *)&known)[lane], turned = ((const double *)&turn)[lane] < 0.0;
-        if (lit) {
-            const long first = (long)((const int *)&row)[lane] * grid.columns + ((const int *)&column)[lane];
-            gather(stack + first * CELL, grid.columns, (const float *)along_x + lane, (const float *)along_y + lane, re, im);
-        }
-        for (int b = 0; b < S_BLOCKS; ++b) {
-            float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
-            if (lit)
-                UNROLL for (int n = 0; n < 16 * BLOCKS; n += 2) {
-                    const float16 even = vload16(n * S_BLOCKS + b, series), odd = vload16((n + 1) * S_BLOCKS + b, series);
-                    even_re = fma((float16)re[n], even, even_re);
-                    even_im = fma((float16)im[n], even, even_im);
-                    odd_re = fma((float16)re[n + 1], odd, odd_re);
-                    odd_im = fma((float16)im[n + 1], odd, odd_im);
-                }
-            const float16 plus_re = even_re - odd_im, plus_im = even_im + odd_re;
-            const float16 minus_re = even_re + odd_im, minus_im = even_im - odd_re;
-            const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
-            ahead[b][lane] = turned ? minus : plus;
-            behind[b][lane] = turned ? plus : minus;
-        }
+/* F_n at one azimuth of a window, zero beyond the scan's band */
+static void gather_azimuth(__global const float *stack, const int columns, const Window *window, const int lane,
+                           float16 (*re)[16], float16 (*im)[16]) {
+    if (!((const int *)&window->known)[lane]) {
+        for (int b = 0; b < BLOCKS; ++b) re[b][lane] = im[b][lane] = 0.0f;
+        return;
     }
-    for (int b = 0; b < S_BLOCKS; ++b) {
-        transpose(ahead[b]);
-        transpose(behind[b]);
-        UNROLL for (int s = 0; s < 16; ++s)
-            if (16 * b + s < S_NODES) {
-                vstore16(ahead[b][s], 16 * b + s, here);
-                vstore16(behind[b][s], 16 * b + s, opposite);
+    const long first = (long)((const int *)&window->row)[lane] * columns + ((const int *)&window->column)[lane];
+    float16 along_x[TAPS_X];
+    UNROLL for (int s = 0; s < TAPS_X; ++s) along_x[s] = ((const float *)window->along_x)[16 * s + lane];
+    for (int b = 0; b < BLOCKS; ++b)
+        gather(stack + first * CELL + 16 * b, columns, along_x, (const float *)window->along_y + lane, &re[b][lane],
+               &im[b][lane]);
+}
+
+/* E at a few nodes in s from F_n, azimuths side by side: at most S_BLOCK, a constant at either call, so that their sums
+ * stay in registers */
+static __attribute__((always_inline)) void power_at_nodes(const float16 (*re)[16], const float16 (*im)[16], const int16 turned,
+                                                           const int nodes, __global const float *series,
+                                                           __global float *here, __global float *opposite) {
+    float16 even_re[S_BLOCK], even_im[S_BLOCK], odd_re[S_BLOCK], odd_im[S_BLOCK];
+    UNROLL for (int j = 0; j < nodes; ++j) even_re[j] = even_im[j] = odd_re[j] = odd_im[j] = 0.0f;
+    for (int b = 0; b < BLOCKS; ++b)
+        UNROLL for (int n = 0; n < 16; n += 2) {
+            __global const float *even = series + (16 * b + n) * S_NODES, *odd = even + S_NODES;
+            UNROLL for (int j = 0; j < nodes; ++j) {
+                even_re[j] = fma((float16)even[j], re[b][n], even_re[j]);
+                even_im[j] = fma((float16)even[j], im[b][n], even_im[j]);
+                odd_re[j] = fma((float16)odd[j], re[b][n + 1], odd_re[j]);
+                odd_im[j] = fma((float16)odd[j], im[b][n + 1], odd_im[j]);
             }
+        }
+    UNROLL for (int j = 0; j < nodes; ++j) {
+        const float16 plus_re = even_re[j] - odd_im[j], plus_im = even_im[j] + odd_re[j];
+        const float16 minus_re = even_re[j] + odd_im[j], minus_im = even_im[j] - odd_re[j];
+        const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
+        STORE(select(plus, minus, turned), here + 16 * j);
+        STORE(select(minus, plus, turned), opposite + 16 * j);
+    }
+}
+
+__kernel void polar_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
+                             __global const double *radius, const int radii, __global const double *azimuth,
+                             __global const float *series, const double fx_max, const double fy_max,
+                             __global float *spectrum) {
+    const int first = RADII * get_global_id(0), count = min(RADII, radii - first), tile = get_global_id(1);
+    __global float *here = spectrum + ((long)tile * radii + first) * 16 * S_NODES;
+    __global float *opposite = here + (long)get_global_size(1) * radii * 16 * S_NODES;
+
+    Window window[RADII];
+    const double16 along_x = vload16(2 * tile, azimuth), along_y = vload16(2 * tile + 1, azimuth);
+    for (int i = 0; i < count; ++i)
+        place_window(grid, decay, radius[first + i] * along_x, radius[first + i] * along_y, fx_max, fy_max, window + i);
+    float16 re[RADII][BLOCKS][16], im[RADII][BLOCKS][16];
+    /* radii inside: the next one's window lies in almost the same cells */
+    for (int lane = 0; lane < 16; ++lane)
+        for (int i = 0; i < count; ++i) gather_azimuth(stack, grid.columns, window + i, lane, re[i], im[i]);
+    for (int i = 0; i < count; ++i) {
+        for (int b = 0; b < BLOCKS; ++b) {
+            transpose(re[i][b]);
+            transpose(im[i][b]);
+        }
+        __global float *ahead = here + (long)i * 16 * S_NODES, *behind = opposite + (long)i * 16 * S_NODES;
+        const int whole = S_NODES - S_NODES % S_BLOCK;
+        for (int s = 0; s < whole; s += S_BLOCK)
+            power_at_nodes(re[i], im[i], window[i].turned, S_BLOCK, series + s, ahead + 16 * s, behind + 16 * s);
+        power_at_nodes(re[i], im[i], window[i].turned, S_NODES % S_BLOCK, series + whole, ahead + 16 * whole, behind + 16 * whole);
     }
 }
