@@ -15,7 +15,7 @@ from cli import console, sources
 
 # what comes with the tool, where no config is named: each recipe with its defaults
 _BUILT_IN = ("elaphe", "xenopeltis", "blazed")
-_PROCESS = "from cli.main import main; main()"
+_PROCESS = "from cli.main import process; process()"
 
 
 @click.command("bench")

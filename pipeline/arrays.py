@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# chunks of about a mebibyte are what one read fetches; a shard is what one file holds
-_CHUNK_BYTES = 2**20
+# a chunk is what one read fetches: smaller ones cost zarr more time than their bytes; a shard is what one file holds
+_CHUNK_BYTES = 2**23
 _SHARD_BYTES = 2**26
 
 

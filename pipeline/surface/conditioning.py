@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
 from pipeline.errors import ScanError
 from pipeline.surface.heightfield import HeightField
@@ -195,6 +193,10 @@ def fill_holes(heights_um: Array, valid: Mask, pitch_um: tuple[float, float]) ->
     there are none). A harmonic function has its extremes on the boundary: up to rounding, no filled height
     lies outside the range of the valid samples around its hole. Valid samples are untouched; one must exist.
     """
+    # sparse solvers take a tenth of a second to import, and most scans have no holes
+    from scipy import sparse
+    from scipy.sparse.linalg import spsolve
+
     hole = ~valid
     heights = heights_um.ravel()
     unknown = np.flatnonzero(hole)

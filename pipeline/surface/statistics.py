@@ -93,16 +93,15 @@ def _seam_energy(heights: Array) -> float:
     The part solves a Poisson equation whose sources are the steps across the patch's edges.
     """
     ny, nx = heights.shape
-    steps = np.zeros_like(heights)
-    steps[0] += heights[-1] - heights[0]
-    steps[-1] += heights[0] - heights[-1]
-    steps[:, 0] += heights[:, -1] - heights[:, 0]
-    steps[:, -1] += heights[:, 0] - heights[:, -1]
-    waves = 2.0 * np.cos(2.0 * np.pi * np.fft.fftfreq(ny))[:, None] + 2.0 * np.cos(2.0 * np.pi * np.fft.rfftfreq(nx))
+    turn_x, turn_y = (2.0 * np.pi * np.arange(n) / n for n in (nx, ny))
+    # sources are two rows and two columns, whose transforms are those of lines
+    rows = fft.fft(heights[-1] - heights[0]) * (1.0 - np.exp(1j * turn_y))[:, None]
+    columns = fft.fft(heights[:, -1] - heights[:, 0])[:, None] * (1.0 - np.exp(1j * turn_x))
+    waves = 2.0 * np.cos(turn_y)[:, None] + 2.0 * np.cos(turn_x)
     waves[0, 0] = np.inf  # the mean, relative to 4
-    smooth = np.fft.irfft2(np.fft.rfft2(steps) / (waves - 4.0), heights.shape)
+    smooth = float(np.sum(np.abs((rows + columns) / (waves - 4.0)) ** 2)) / heights.size**2
     variance = float(np.var(heights))
-    return float(np.var(smooth)) / variance if variance > 0.0 else 0.0
+    return smooth / variance if variance > 0.0 else 0.0
 
 
 def _rms(values: Array) -> float:
@@ -243,9 +242,10 @@ def _candidates(spectrum: _Spectrum, highest_per_um: float) -> list[complex]:
     bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
     lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
     candidates: list[tuple[float, complex]] = []
+    transform = fft.rfft2(spectrum.power, workers=-1)
     while lowest < float(radius.max()):
         width_x, width_y = _extent(spectrum, complex(1.4 * lowest), _KERNEL, _KERNEL_BINS)
-        density = _smooth(spectrum, width_x, width_y)
+        density = _smooth(spectrum, transform, width_x, width_y)
         peaks = allowed & (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
         peaks &= density == ndimage.maximum_filter(density, 3)
         # of a lobe narrower than the kernel this is all, of a wider one a part: let no weak one pass by
@@ -257,12 +257,11 @@ def _candidates(spectrum: _Spectrum, highest_per_um: float) -> list[complex]:
     return [frequency for _, frequency in candidates]
 
 
-def _smooth(spectrum: _Spectrum, width_x: float, width_y: float) -> Array:
-    """The power convolved with a Gaussian of standard deviations `width_x`, `width_y`, 1/um."""
+def _smooth(spectrum: _Spectrum, transform: NDArray[np.complex128], width_x: float, width_y: float) -> Array:
+    """The power, whose real `transform` is given, convolved with a Gaussian of widths `width_x`, `width_y`, 1/um."""
     my, mx = spectrum.power.shape
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
     gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * fft.fftfreq(my)) ** 2)
-    transform = fft.rfft2(spectrum.power, workers=-1)
     smooth: Array = fft.irfft2(transform * gain_y[:, None] * gain_x, s=(my, mx), workers=-1)
     return smooth
 
