@@ -2,7 +2,9 @@
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from pipeline import provenance
@@ -90,8 +92,12 @@ def execute(
     """
     keys = {step.stage.name: step.key for step in steps}
     if any(step.stage.name in _ON_DEVICE and not step.cached for step in steps):
-        # better now than after the minutes before the first kernel
-        require_device()
+        # better now than after the minutes before the first kernel; drivers answer as slowly as zarr is imported
+        with ThreadPoolExecutor(1) as beside:
+            answer = beside.submit(require_device)
+            import_module("zarr")
+            answer.result()
+    opened: dict[str, Artifact] = {}
     for step in steps:
         name, seconds = step.stage.name, None
         if store.has(name, step.key):
@@ -101,8 +107,11 @@ def execute(
                 # another run may have made it while we waited
                 if not store.has(name, step.key):
                     started = time.perf_counter()
-                    inputs = {needed: store.open(needed, keys[needed]) for needed in step.stage.inputs}
-                    _make(config, step, inputs, store, progress)
+                    for needed in set(step.stage.inputs) - set(opened):
+                        opened[needed] = store.open(needed, keys[needed])
+                    _make(config, step, {needed: opened[needed] for needed in step.stage.inputs}, store, progress)
+                    # its files were hashed as they were written
+                    opened[name] = store.describe(name, step.key)
                     seconds = time.perf_counter() - started
         if on_step is not None:
             on_step(step, seconds)
