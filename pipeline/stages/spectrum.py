@@ -18,6 +18,8 @@ from pipeline.tables import plan
 from pipeline.tables.polar_grid import Azimuths, Rings
 
 _FILE = "spectrum.zarr"
+# by its key, what this process made last: the table that follows takes longer to read it back than to use it
+_just_made: dict[str, spectrum.PolarSpectrum] = {}
 
 
 def layout_of(config: Config) -> PolarLayout:
@@ -80,6 +82,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "band_per_um": list(built.band_per_um),
         },
     )
+    _just_made.clear()
+    _just_made[SPECTRUM.key(config, {"surface": inputs["surface"].key})] = built
     return {
         **asdict(chosen),
         "radii": len(built.radius_per_um),
@@ -97,7 +101,9 @@ def planned(artifact: Artifact) -> plan.Plan:
 
 
 def load(artifact: Artifact) -> spectrum.PolarSpectrum:
-    """The power spectrum of a spectrum artifact."""
+    """The power spectrum of a spectrum artifact; the first time from memory, where this process has just made it."""
+    if artifact.key in _just_made:
+        return _just_made.pop(artifact.key)
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     return spectrum.PolarSpectrum(
