@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# a chunk is what one read fetches: smaller ones cost zarr more time than their bytes. A shard is what one file holds and
-# what is put together in memory: larger ones cost more time than the files they save
+# a chunk is what one read fetches: smaller ones cost zarr more time than their bytes; a shard is what one file holds
+# and what is put together in memory: larger ones cost more time than the files they save
 _CHUNK_BYTES = 2**22
 _SHARD_BYTES = 2**23
 

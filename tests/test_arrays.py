@@ -34,7 +34,9 @@ def test_round_trip(tmp_path_factory, values):
     assert arrays.attributes(folder) == {"kept": [1, 2.5, "x"]}
 
 
-@pytest.mark.parametrize("shape", [(1,), (1, 1, 1), (300_001,), (3, 700_000), (4099, 513), (2, 3, 100, 700), (5, 1_300_000)])
+@pytest.mark.parametrize(
+    "shape", [(1,), (1, 1, 1), (300_001,), (3, 700_000), (4099, 513), (2, 3, 100, 700), (5, 1_300_000)]
+)
 def test_round_trip_over_several_chunks(tmp_path, shape):
     """Shapes that fill no whole number of chunks or shards."""
     values = np.random.default_rng(1).random(shape, dtype=np.float32)
