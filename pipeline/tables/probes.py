@@ -13,7 +13,10 @@ from pipeline.tables import polar, spectral_integral
 from pipeline.tables.ingredients import Ingredients
 from pipeline.tables.scattering import probing_angles
 
-_RHOS, _ANGLES = 48, 64
+# rings of probes: of so many that share all directions evenly, the innermost and one of every few beyond. Few
+# directions lie on the flank of the mirror's lobe, and their errors are a hundred times the mean's
+_SHARES, _INNERMOST, _EVERY = 192, 8, 4
+_ANGLES = 64
 _SPARE_W_TERMS = 8
 _SEED = 19991
 
@@ -25,9 +28,12 @@ class Probes:
         half, counts = probing_angles(of.stack, _ANGLES, np.random.default_rng(_SEED))
         # angles of half a turn serve its other half as well
         angles = np.concatenate([half, half + np.pi])
-        wi, wr = random_pairs(scene, _RHOS * len(angles), _SEED)
+        wi, wr = random_pairs(scene, _SHARES * len(angles), _SEED)
         uvw = geometry.uvw(wi, wr)
-        order = np.argsort(np.hypot(uvw[:, 0], uvw[:, 1])).reshape(_RHOS, len(angles))
+        beyond = np.arange(_INNERMOST + _EVERY // 2, _SHARES, _EVERY)
+        order = np.argsort(np.hypot(uvw[:, 0], uvw[:, 1])).reshape(_SHARES, len(angles))
+        order = order[np.concatenate([np.arange(_INNERMOST), beyond])]
+        stands_for = np.where(np.arange(len(order)) < _INNERMOST, 1, _EVERY)[:, None]
         # the pairs of a ring share its radius and keep their own w
         rho = np.minimum(np.median(np.hypot(uvw[order, 0], uvw[order, 1]), axis=1), rho_max)
         w = uvw[order, 2]
@@ -36,7 +42,7 @@ class Probes:
         factor = brdf.direction_factor(Material(), trapezoid(of.light, 1.0), wi[order], wr[order])
         self._factor = factor.reshape(-1, 1)
         self._exact = _exact(of, half, rho, w).reshape(-1, 3)
-        self._counts = np.broadcast_to(np.tile(counts, 2), factor.shape).ravel()
+        self._counts = (stands_for * np.tile(counts, 2)).ravel()
         self._exposure_ru = exposure_ru
 
     def error(self, table: polar.PolarTable) -> float:

@@ -19,9 +19,10 @@ from pipeline.tables.quadrature import RingQuadratures
 _STEP_ON_RADII, _STEP_BETWEEN = 0.5, 0.25
 # distances of points between radii, in distances of radii: E there is a polynomial in pieces, not one
 _STEP_IN_RADII = 0.7
-# (s / s_max - 1) nodes^2 = g at the last radius, beyond the shortest wavelength: the tail of E's series in s grows to
-# cosh(2 sqrt(g)) times what it was, 1500; Lagrange's weight out there is at most 2.4e-3
-_MOST_BEYOND = 16.0
+# how far s / s_max may pass 1 at the last radius, beyond the shortest wavelength, and that times nodes^2 = g: the
+# tail of E's series in s grows to cosh(2 sqrt(g)) times what it was, 1500; Lagrange's weight out there is at most
+# 2.4e-3. A series of few nodes has a large tail: at g = 16 and a third beyond, 7 nodes lost 4 % of a ring
+_BEYOND, _BEYOND_BY_NODES = 0.1, 16.0
 
 
 def integrate(
@@ -60,7 +61,7 @@ def line_points(
     on_radii = (
         (first >= 0)
         & (s_rate * kappa_rate * spacing[last - 1] <= _STEP_ON_RADII)
-        & (beyond * s_nodes**2 <= _MOST_BEYOND)
+        & (beyond <= min(_BEYOND, _BEYOND_BY_NODES / s_nodes**2))
     )
     # of points between radii: the rates at which E turns along r and along s add up; a line's points stay above 0
     step = 1.0 / (rho / (_STEP_IN_RADII * spacing[np.abs(first)]) + s_rate / _STEP_BETWEEN + ORDER / high)
