@@ -132,7 +132,7 @@ def _tracks(disc: Surface, progress: Progress) -> Check:
     lines = ", ".join(f"{nm:g}" for nm in _DISC_LINES_NM)
     return Check(
         f"CD: orders {_DISC_ORDERS[0]} to {_DISC_ORDERS[-1]} of the tracks along the vertical at {lines} nm",
-        f"sin theta = m lambda / {_DISC.track_um:g} um, within {_PEAK_WITHIN:g} of a line's width sigma_f lambda",
+        f"sin θ = m λ / {_DISC.track_um:g} µm, within {_PEAK_WITHIN:g} of a line's width σ_f λ",
         f"at most {away:.3f} of it away",
         away < _PEAK_WITHIN,
     )
@@ -182,7 +182,7 @@ def _resembles(elaphe: _Shown, look_up: Array) -> Check:
     paper = [mean_delta_e(config, look_up, elaphe.exact, ru) for ru in (SHOWN_RU, STRICT_RU)]
     ours = [elaphe.error(ru) for ru in (SHOWN_RU, STRICT_RU)]
     return Check(
-        f"Elaphe: mean dE of the paper's look-up from the reference at {SHOWN_RU:g} and {STRICT_RU:g} RU",
+        f"Elaphe: mean ΔE of the paper's look-up from the reference at {SHOWN_RU:g} and {STRICT_RU:g} RU",
         "visually similar (fig. 13); this project's table nearer at the higher exposure",
         f"{paper[0]:.2f} and {paper[1]:.2f}; this project's table {ours[0]:.3f} and {ours[1]:.3f}",
         ours[1] < paper[1],
@@ -194,7 +194,7 @@ def _within_budget(shown: Sequence[_Shown]) -> Check:
     errors = {each.name: each.error(STRICT_RU) for each in shown}
     mean, worst = sum(errors.values()) / len(errors), max(errors, key=lambda name: errors[name])
     return Check(
-        f"this project's table against the exact maps, mean dE at {STRICT_RU:g} RU",
+        f"this project's table against the exact maps, mean ΔE at {STRICT_RU:g} RU",
         f"at most {budget:g} in the mean over maps, what it is planned for",
         f"{mean:.3f}; of single maps at most {errors[worst]:.3f} ({worst})",
         mean <= budget,
@@ -207,7 +207,7 @@ def _table(shown: Sequence[_Shown], views: Map) -> Table:
         horizontal, vertical = map_physics.sectors(each.exact[:, 1], views, each.light)
         errors = [f"{each.error(ru):.3f}" for ru in (SHOWN_RU, STRICT_RU)]
         rows.append([each.name, f"{horizontal:.3f}", f"{vertical:.3f}", *errors])
-    columns = ["map", "share horizontal", "share vertical", "mean dE, 1500 RU", "mean dE, 7500 RU"]
+    columns = ["map", "share horizontal", "share vertical", "mean ΔE, 1500 RU", "mean ΔE, 7500 RU"]
     caption = "Where the diffracted luminance goes, and this project's table against the exact map"
     return Table(caption, columns, rows)
 

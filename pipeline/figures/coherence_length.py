@@ -127,7 +127,7 @@ def _checks(found: Sequence[_Seen]) -> list[Check]:
         Check(
             "purity of the first order's colours grows with the coherence length",
             "poorly resolved at short lengths",
-            ", ".join(f"{each.sigma_um:g} um: {each.purity:.2f}" for each in found),
+            ", ".join(f"{each.sigma_um:g} µm: {each.purity:.2f}" for each in found),
             purities == sorted(purities),
         ),
     ]
@@ -146,10 +146,10 @@ def _table(found: Sequence[_Seen], recipe: Blazed) -> Table:
         for each in found
     ]
     columns = [
-        "sigma (um)",
+        "σ (µm)",
         "periods in 4 sigma",
-        "sigma_f / sqrt(2) (1/um)",
-        "measured (1/um)",
+        "σ_f / √2 (1/µm)",
+        "measured (1/µm)",
         "wavelengths mixed at 550 nm (nm)",
         "purity",
     ]

@@ -68,7 +68,7 @@ def _checks(runs: Sequence[Run], errors: dict[str, tuple[float, float]]) -> list
     quicker = [each.name for each in runs if each.total_s < ours.total_s and errors[each.name][1] < errors[OURS][1]]
     return [
         Check(
-            f"mean dE at {STRICT_RU:g} RU of the paper's table over ours",
+            f"mean ΔE at {STRICT_RU:g} RU of the paper's table over ours",
             f"at least {_TIMES_BELOW:g}",
             f"{better:.1f} ({errors[PAPER][1]:.2f} over {errors[OURS][1]:.3f})",
             better >= _TIMES_BELOW,
@@ -102,8 +102,8 @@ def _table(runs: Sequence[Run], errors: dict[str, tuple[float, float]], views: M
         "keeps",
         "map (s)",
         "a view (us)",
-        "mean dE, 1500 RU",
-        "mean dE, 7500 RU",
+        "mean ΔE, 1500 RU",
+        "mean ΔE, 7500 RU",
     ]
     return Table(f"Every method on Elaphe, a map of {views.size} x {views.size}, normal incidence", columns, rows)
 

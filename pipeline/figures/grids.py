@@ -91,7 +91,7 @@ def _beaten(found: _Grids, sizes: Sequence[int]) -> list[Check]:
     checks = []
     for nodes in sizes:
         linear, published = (float(found[nodes, a].error.mean()) for a in (_LINEAR, PUBLISHED_POWER))
-        what = f"{nodes} x {nodes} nodes: mean dE of the map at 7500 RU"
+        what = f"{nodes} x {nodes} nodes: mean ΔE of the map at 7500 RU"
         measured = f"a = 1: {linear:.2f}, a = 5: {published:.2f}"
         checks.append(Check(what, "a = 5 below a = 1", measured, published < linear))
     return checks
@@ -155,7 +155,7 @@ def _table(found: _Grids) -> Table:
         ]
         for (nodes, power), grid in found.items()
     ]
-    columns = ["nodes", "a", "mean dE, 1500 RU", "mean dE, 7500 RU", "99th percentile, 7500 RU", "detail kept"]
+    columns = ["nodes", "a", "mean ΔE, 1500 RU", "mean ΔE, 7500 RU", "99th percentile, 7500 RU", "detail kept"]
     return Table("The paper's table on Elaphe by grid, against the exact map", columns, rows)
 
 

@@ -197,7 +197,7 @@ def _table(sheets: Sequence[_Sheet]) -> Table:
         for name in _COMPARED
     ]
     columns = ["method", *(f"{each.surface.name}, {ru:g} RU" for each in sheets for ru in (SHOWN_RU, STRICT_RU))]
-    return Table("Mean dE from the exact map at normal incidence; GPU Gems over its strip", columns, rows)
+    return Table("Mean ΔE from the exact map at normal incidence; GPU Gems over its strip", columns, rows)
 
 
 def _picture(views: Map, sheet: _Sheet) -> Picture:

@@ -44,7 +44,7 @@ _ORDER_ONE = (
     "either side are equally bright. What parts them are the terms of order 2 and above, against those below."
 )
 _STATED = (
-    f"Errors are mean dE over views that are not black at {SHOWN_RU:g} RU, of a 41 x 41 map at normal incidence, "
+    f"Errors are mean ΔE over views that are not black at {SHOWN_RU:g} RU, of a 41 x 41 map at normal incidence, "
     f"against the exact sum at the same {STEP_NM:g} nm steps."
 )
 
@@ -126,7 +126,7 @@ def _published(studies: Sequence[_Study]) -> list[Check]:
         enough = study.enough(_CENTRED, 0)
         checks.append(
             Check(
-                f"{study.surface.name}: mean dE of lit views at {SHOWN_RU:g} RU with N = {order}",
+                f"{study.surface.name}: mean ΔE of lit views at {SHOWN_RU:g} RU with N = {order}",
                 f"visually converged at N = {order}",
                 f"{centred:.2f} centred (below 1 from N = {enough:g}), {raised:.3g} with heights from 0",
                 None,
@@ -135,7 +135,7 @@ def _published(studies: Sequence[_Study]) -> list[Check]:
     worst = max(study.errors[_RAISED][_PUBLISHED_ALL][1] for study in studies)
     checks.append(
         Check(
-            f"all surfaces, heights from 0: mean dE of lit views at {STRICT_RU:g} RU with N = {_PUBLISHED_ALL}",
+            f"all surfaces, heights from 0: mean ΔE of lit views at {STRICT_RU:g} RU with N = {_PUBLISHED_ALL}",
             "visually converged: below 1",
             f"at most {worst:.2g}; our bound asks for N = "
             + ", ".join(f"{study.bound_raised} ({study.surface.name})" for study in studies),
@@ -155,7 +155,7 @@ def _bounds(studies: Sequence[_Study]) -> Check:
     }
     chosen = ", ".join(f"{study.surface.name} N = {study.bound}" for study in studies)
     return Check(
-        f"the N that this project's bound chooses: mean dE of lit views at {STRICT_RU:g} RU",
+        f"the N that this project's bound chooses: mean ΔE of lit views at {STRICT_RU:g} RU",
         f"below {_CONVERGED:g}",
         f"{chosen}: at most {max(left.values()):.1g}",
         max(left.values()) < _CONVERGED,
@@ -169,7 +169,7 @@ def _fewer(studies: Sequence[_Study]) -> Check:
         for study, (chebyshev, centred, raised) in zip(studies, orders, strict=True)
     ]
     return Check(
-        f"smallest N tried with mean dE below 1 at {STRICT_RU:g} RU: Chebyshev / Taylor centred / Taylor from 0",
+        f"smallest N tried with mean ΔE below 1 at {STRICT_RU:g} RU: Chebyshev / Taylor centred / Taylor from 0",
         "ascending",
         "; ".join(told),
         all(chebyshev <= centred < raised for chebyshev, centred, raised in orders),
@@ -217,7 +217,7 @@ def _table(studies: Sequence[_Study]) -> Table:
         for n in orders
     ]
     columns = ["N", *(f"{study.surface.name}: {name}" for study in studies for name in names)]
-    return Table(f"Mean dE of lit views at {STRICT_RU:g} RU by order", columns, rows)
+    return Table(f"Mean ΔE of lit views at {STRICT_RU:g} RU by order", columns, rows)
 
 
 def _modes_table(modes: dict[int, float]) -> Table:

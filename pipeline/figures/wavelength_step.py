@@ -25,7 +25,7 @@ _AT_ONCE = 2048
 _NOTICEABLE = 1.0
 _GAPS = (
     "A direction sees every wavelength under a line as wide as the window's transform, so steps above "
-    "lambda^2 sigma_f / rho leave gaps between the lines: about 3 nm at the rim for sigma = 16.25 um, and more the "
+    "λ² σ_f / ρ leave gaps between the lines: about 3 nm at the rim for σ = 16.25 µm, and more the "
     "nearer the mirror direction. There the artefacts of a step begin."
 )
 _STATED = (
@@ -105,13 +105,13 @@ def _checks(elaphe: _Steps, blazed: _Steps) -> list[Check]:
     finest = max(each.mean(STEP_NM, STRICT_RU) for each in (elaphe, blazed))
     return [
         Check(
-            "Elaphe, 5 nm: not to be discerned, mean dE below 1",
+            "Elaphe, 5 nm: not to be discerned, mean ΔE below 1",
             "indiscernible",
             f"{at_5:.3f} at {SHOWN_RU:g} RU, {strict_5:.3f} at {STRICT_RU:g} RU",
             max(at_5, strict_5) < _NOTICEABLE,
         ),
         Check(
-            "Elaphe, 10 nm: artefacts, mean dE above 1 at 7500 RU",
+            "Elaphe, 10 nm: artefacts, mean ΔE above 1 at 7500 RU",
             "artefacts",
             f"{at_10:.2f} at {SHOWN_RU:g} RU, {strict_10:.2f} at {STRICT_RU:g} RU",
             strict_10 > _NOTICEABLE,
@@ -123,14 +123,14 @@ def _checks(elaphe: _Steps, blazed: _Steps) -> list[Check]:
             None,
         ),
         Check(
-            "the blazed grating at 10 nm, mean dE at 7500 RU",
+            "the blazed grating at 10 nm, mean ΔE at 7500 RU",
             "bears larger steps than Elaphe",
             f"over the map {blazed.mean(coarse, STRICT_RU):.2f}, Elaphe {strict_10:.2f}; over lit views "
             f"{blazed.lit_mean(coarse, STRICT_RU):.2f}, Elaphe {elaphe.lit_mean(coarse, STRICT_RU):.2f}",
             None,
         ),
         Check(
-            f"the reference's own step of {STEP_NM:g} nm, mean dE at 7500 RU, the worse of both surfaces",
+            f"the reference's own step of {STEP_NM:g} nm, mean ΔE at 7500 RU, the worse of both surfaces",
             "below 0.01",
             f"{finest:.1g}",
             finest < 1e-2,
@@ -150,8 +150,8 @@ def _table(found: _Steps) -> Table:
     ]
     columns = [
         "step (nm)",
-        "mean dE, 1500 RU",
-        "mean dE, 7500 RU",
+        "mean ΔE, 1500 RU",
+        "mean ΔE, 7500 RU",
         "of lit views, 7500 RU",
         "99th percentile, 7500 RU",
     ]
