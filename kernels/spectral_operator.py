@@ -1,6 +1,7 @@
 """Host side of the spectral operator's kernels. Layouts as stated in opencl/spectral_operator.cl."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -57,10 +58,29 @@ def integrate(
     """
     tiles, radii, s_nodes, _ = spectrum.shape
     w_terms, rings = reflectance.shape[1], len(rho)
+    program, operator = _operator(radius_per_um, s_nodes, s_max_per_um, rho, points, quadratures, reflectance)
+    to_w_terms = device.upload(chebyshev(w_terms)[0].astype(np.float32))
+    out = device.empty((rings, 3 * w_terms, LANES * tiles), np.float32)
+    power, result = device.lent(spectrum), device.shared(out)
+    size = _RINGS_TOGETHER, tiles // 2, -(-rings // _RINGS_TOGETHER)
+    program.launch("apply_operator", size, power, np.int32(radii), np.int32(rings), *operator, to_w_terms, result)
+    return device.settle(result, out)
+
+
+def _operator(
+    radius_per_um: np.ndarray,
+    s_nodes: int,
+    s_max_per_um: float,
+    rho: np.ndarray,
+    points: LinePoints,
+    quadratures: RingQuadratures,
+    reflectance: np.ndarray,
+) -> tuple[device.Program, list[Any]]:
+    """The program, and the operator of every ring from E on `s_nodes`: rings, places and weights on the device."""
+    w_terms = reflectance.shape[1]
     constants = {"ORDER": ORDER, "S_NODES": s_nodes, "W_TERMS": w_terms, "W_BLOCK": 4 if w_terms % 8 else 8}
     program = device.program(("spectral_operator.cl",), constants)
-    to_s_terms, to_w_terms = (chebyshev(n)[0].astype(np.float32) for n in (s_nodes, w_terms))
-    ring, place = (device.upload(a) for a in (_rings(points, quadratures), points.place.astype(np.int32)))
+    where = [device.upload(a) for a in (_rings(points, quadratures), points.place.astype(np.int32))]
     inputs = [
         device.upload(a)
         for a in (
@@ -70,20 +90,14 @@ def integrate(
             quadratures.lambda_um,
             fourth_column(quadratures.weights).astype(np.float32),
             reflectance.astype(np.float32),
-            to_s_terms,
+            chebyshev(s_nodes)[0].astype(np.float32),
             w_nodes(w_terms).astype(np.float32),
         )
     ]
     floats = ORDER, s_nodes * w_terms, 3 * w_terms
-    operator = [device.result_buffer(4 * len(points.place) * n) for n in floats]
-    program.launch("build_operator", (rings,), ring, place, *inputs, np.float32(s_max_per_um), *operator)
-
-    out = device.empty((rings, 3 * w_terms, LANES * tiles), np.float32)
-    power, result = device.lent(spectrum), device.shared(out)
-    size = _RINGS_TOGETHER, tiles // 2, -(-rings // _RINGS_TOGETHER)
-    counts = np.int32(radii), np.int32(rings)
-    program.launch("apply_operator", size, power, *counts, ring, place, *operator, device.upload(to_w_terms), result)
-    return device.settle(result, out)
+    weights = [device.result_buffer(4 * len(points.place) * n) for n in floats]
+    program.launch("build_operator", (len(rho),), *where, *inputs, np.float32(s_max_per_um), *weights)
+    return program, [*where, *weights]
 
 
 def _rings(points: LinePoints, quadratures: RingQuadratures) -> np.ndarray:

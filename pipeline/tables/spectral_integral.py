@@ -54,10 +54,11 @@ def line_points(
     )
     first, last = _about(radius_per_um, rho * low), _about(radius_per_um, rho * high) + ORDER - 1
     spacing = np.diff(radius_per_um)
-    # of s, in distances of its nodes, for a step of kappa; of kappa, for a step of r
-    s_rate = 2.0 * pi * np.sqrt(np.maximum(4.0 - rho**2, 0.0)) / s_max_per_um * (s_nodes - 1)
+    # what a step of kappa does to s: as a share of s_max, and in distances of its nodes; a step of r to kappa
+    share_rate = 2.0 * pi * np.sqrt(np.maximum(4.0 - rho**2, 0.0)) / s_max_per_um
+    s_rate = share_rate * (s_nodes - 1)
     kappa_rate = 1.0 / np.maximum(rho, np.finfo(np.float32).tiny)
-    beyond = s_rate / (s_nodes - 1) * radius_per_um[last] * kappa_rate - 1.0
+    beyond = share_rate * kappa_rate * radius_per_um[last] - 1.0
     on_radii = (
         (first >= 0)
         & (s_rate * kappa_rate * spacing[last - 1] <= _STEP_ON_RADII)
