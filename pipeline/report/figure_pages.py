@@ -12,7 +12,7 @@ _SOURCES = (
     "Simulating Diffraction, GPU Gems ch. 8, 2004."
 )
 _TERMS = (
-    "1 RU saturates a mirror seen in its own reflection. dE is CIELAB dE*ab of 1976 between displayed colours. a is "
+    "1 RU saturates a mirror seen in its own reflection. ΔE is CIELAB ΔE*ab of 1976 between displayed colours. a is "
     "the exponent of the paper's grid, N the order of its Taylor series; FLSS, NMM and PQ are [S14]'s shaders. "
     "Statements are judged where source or theory says what must come out, else told."
 )
