@@ -14,12 +14,12 @@ from pipeline.errors import AccuracyError
 from pipeline.evaluate import Evaluator
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.reference import reference_of
 from pipeline.spectrum import PolarSpectrum
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import spectral
+from pipeline.tables import plan, spectral
 from pipeline.validation import (
     MIRROR_FLOOR,
     RandomCheck,
@@ -61,10 +61,21 @@ def certify(evaluate: Evaluator, field: HeightField, config: Config, progress: P
     if measured > budget:
         raise AccuracyError(
             f"the table misses its budget: on {random.directions} random directions its mean CIELAB error at "
-            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. Raise it, or leave "
-            'table.rings, azimuths, terms and w_terms on "auto".'
+            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. {_way_out(field, config)}"
         )
     return Certificate(budget, exposure, measured, random, checked)
+
+
+def _way_out(field: HeightField, config: Config) -> str:
+    """What to do about a missed budget: grids follow anything but the sharp edge of what a coarse scan knows."""
+    text = 'Raise it, or leave table.rings, azimuths, terms and w_terms on "auto".'
+    band = min(field.band_limit_per_um)
+    if band >= plan.rho_max(config.scene) / (1e-3 * shortest_wavelength_nm(config.spectrum)):
+        return text
+    return (
+        f"{text} Where light is bright at {band:.3g} per um, where the pitch ends what is known, no table follows "
+        "the sudden dark: spectrum.range_nm or scene.views can leave out what lies beyond."
+    )
 
 
 def certify_spectral(power: PolarSpectrum, config: Config, field: HeightField) -> RelativeError | None:

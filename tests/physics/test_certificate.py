@@ -90,6 +90,17 @@ def test_a_table_that_misses_its_budget_gets_no_certificate() -> None:
         certificate.certify(table_evaluator(table, found), field_of(found), found)
 
 
+def test_a_budget_missed_beside_a_coarse_pitch_names_it() -> None:
+    """What a pitch of 0.1 um knows ends at 5 per um, views reach 5.26; at 0.09 um they reach nothing unknown."""
+    for pitch, named in ((0.1, True), (0.09, False)):
+        recipe = {"kind": "sinusoid", "size_um": 9, "pitch_um": pitch, "period_um": 0.9}
+        found = config(surface={"recipe": recipe}, table={"rings": 12, "azimuths": 32})
+        table, _ = planned(found)
+        with pytest.raises(AccuracyError) as missed:
+            certificate.certify(table_evaluator(table, found), field_of(found), found)
+        assert ("bright at 5 per um" in str(missed.value)) == named
+
+
 def test_the_certificate_sees_a_table_turned_the_wrong_way() -> None:
     """A sign that mirrors every blaze is no small error."""
     found = config(surface={"recipe": {"kind": "blazed", "size_um": 12, "pitch_um": 0.1}})
