@@ -30,9 +30,10 @@ class RingQuadratures:
 class LinePoints:
     """Where along kappa = 1 / lambda every ring takes E, one ring after the other.
 
-    kappa_per_um: (points,) ascending in each ring, ORDER or more. place: (points,) the radius r = rho kappa, or the
-    first of the ORDER about it, negative below the origin. first, count: (rings,) where a ring's begin and how many
-    they are. on_radii: (rings,) whether they lie on radii of E.
+    kappa_per_um: (points,) ascending in each ring. place: (points,) the radius r = rho kappa, or the first of the
+    ORDER about it, negative below the origin. first, count: (rings,) where a ring's begin and how many they are.
+    on_radii: (rings,) whether they lie on radii of E. on_nodes: (rings,) whether they are the ring's wavelengths;
+    else they are ORDER or more.
     """
 
     kappa_per_um: np.ndarray
@@ -40,6 +41,7 @@ class LinePoints:
     first: np.ndarray
     count: np.ndarray
     on_radii: np.ndarray
+    on_nodes: np.ndarray
 
 
 def integrate(
@@ -101,10 +103,10 @@ def _operator(
 
 
 def _rings(points: LinePoints, quadratures: RingQuadratures) -> np.ndarray:
-    """The kernels' Ring of every ring, int32 (rings, 6)."""
+    """The kernels' Ring of every ring, int32 (rings, 7)."""
     reflected = np.concatenate([[0], np.cumsum(quadratures.count)[:-1]])
-    columns = points.first, points.count, points.on_radii, quadratures.first, quadratures.count, reflected
-    return np.stack(columns, axis=-1).astype(np.int32)
+    where = points.first, points.count, points.on_radii, points.on_nodes
+    return np.stack([*where, quadratures.first, quadratures.count, reflected], axis=-1).astype(np.int32)
 
 
 def w_nodes(w_terms: int) -> np.ndarray:

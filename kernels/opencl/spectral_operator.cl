@@ -11,7 +11,8 @@
  *   G(p, w) = sum_j C_j(2 pi |w| kappa_p) E(rho kappa_p, s_j)
  *   I(w)    = sum_p shares[p] G(p, w),   shares[p] = sum_l weights[l] L_p(1 / l)
  *
- * Where a ring's points are chosen on radii of E (rho kappa_p = r_a) nothing is interpolated over r.
+ * Where a ring's points are chosen on radii of E (rho kappa_p = r_a) nothing is interpolated over r; where they are its
+ * wavelengths, nothing along the line.
  *
  * Set by the host: ORDER (even); S_NODES; W_TERMS, a multiple of W_BLOCK, and W_BLOCK, 4 or 8.
  */
@@ -23,6 +24,7 @@
 typedef struct {
     int first, points;   /* of the ring, among those of all rings */
     int on_radii;        /* whether they lie on radii of E */
+    int on_nodes;        /* whether they are the wavelengths themselves, from the last to the first */
     int nodes, count;    /* where the ring's quadrature begins, and its length */
     int reflected;       /* where its rows of `reflectance` begin */
 } Ring;
@@ -91,18 +93,23 @@ __kernel void build_operator(__global const Ring *rings, __global const int *pla
     }
 
     /* wavelengths ascend, so the points about them descend */
-    int first = ring.points - ORDER;
+    __global const double *line = kappa + ring.first;
+    const int about = ring.on_nodes ? 1 : ORDER;
+    int first = ring.points - about;
     for (int l = 0; l < ring.count; ++l) {
-        const double at = 1.0 / lambda[ring.nodes + l];
-        __global const double *about = kappa + ring.first;
-        while (first > 0 && about[first + ORDER / 2 - 1] > at) --first;
-        for (int a = 0; a < ORDER; ++a) x[a] = about[first + a];
-        float weight[ORDER];
-        lagrange(x, at, weight);
+        float weight[ORDER] = {1.0f};
+        if (ring.on_nodes)
+            first = ring.points - 1 - l;
+        else {
+            const double at = 1.0 / lambda[ring.nodes + l];
+            while (first > 0 && line[first + ORDER / 2 - 1] > at) --first;
+            for (int a = 0; a < ORDER; ++a) x[a] = line[first + a];
+            lagrange(x, at, weight);
+        }
         const float4 xyz = weights[ring.nodes + l];
         const float channel[3] = {xyz.x, xyz.y, xyz.z};
         __global const float *reflected = reflectance + (long)(ring.reflected + l) * W_TERMS;
-        for (int a = 0; a < ORDER; ++a) {
+        for (int a = 0; a < about; ++a) {
             __global float *share = shares + (long)(ring.first + first + a) * 3 * W_TERMS;
             for (int c = 0; c < 3; ++c)
                 for (int m = 0; m < W_TERMS; m += 4) {

@@ -9,7 +9,7 @@ from pipeline import series, spectrum
 from pipeline.config import LaserLine, Material, Spectrum
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.spectra import Quadrature, trapezoid
 from pipeline.reference import Reference, power_direct
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables import polar, quadrature, spectral, spectral_integral
@@ -72,42 +72,62 @@ def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
     np.testing.assert_allclose(thinned.values, coarse.values, rtol=1e-4, atol=1e-7)
 
 
-@pytest.mark.parametrize("w_terms", [8, 12])
-@pytest.mark.parametrize(("range_nm", "tolerance"), [((380.0, 780.0), 6e-3), ((500.0, 560.0), 2.5e-2)])
-def test_a_ring_holds_the_integral_over_wavelengths(
-    w_terms: int, range_nm: tuple[float, float], tolerance: float
-) -> None:
-    """Rings at the origin, where radii are mirrored, and out to the rim; nodes of w by eight and by four.
+# the origin, where radii are mirrored, and out to the rim
+RHO = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.9, 2.0])
 
-    A narrow range averages less of what the radii's distance leaves.
-    """
-    field = rough()
-    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
-    rho = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.9, 2.0])
-    rule = trapezoid(Spectrum(range_nm=range_nm), 5.0)
+
+def integral_error(field: HeightField, power: spectrum.PolarSpectrum, rule: Quadrature, w_terms: int) -> float:
+    """The largest difference between rings' integrals and the reference's, over the mean and what is there."""
     terms = spectral_integral.integrate(
         power.values,
         power.radius_per_um,
         power.s_max_per_um,
-        rho,
-        quadrature.uniform(rule, len(rho)),
-        ones(rule, len(rho), w_terms),
+        RHO,
+        quadrature.uniform(rule, len(RHO)),
+        ones(rule, len(RHO), w_terms),
     )
-    assert terms.shape == (len(rho), 3, w_terms, 32)
-    reference = Reference(field, SIGMA, range_nm[0])
+    assert terms.shape == (len(RHO), 3, w_terms, 32)
+    reference = Reference(field, SIGMA, rule.lambda_min_nm)
+    worst = 0.0
     for share in (0.05, 0.5, 0.97):
         cosines = np.cos(np.arange(w_terms) * np.arccos(2.0 * share - 1.0))
         found = np.einsum("rcka,k->rac", terms, cosines)
         phi = power.azimuths.angles()
-        w = -share * np.sqrt(4.0 - rho**2)
+        w = -share * np.sqrt(4.0 - RHO**2)
         uvw = np.stack(
-            np.broadcast_arrays(rho[:, None] * np.cos(phi), rho[:, None] * np.sin(phi), w[:, None]), axis=-1
+            np.broadcast_arrays(RHO[:, None] * np.cos(phi), RHO[:, None] * np.sin(phi), w[:, None]), axis=-1
         )
         exact = np.nan_to_num(reference.power(uvw.reshape(-1, 3), rule.lambda_nm)) @ rule.weights
         exact = exact.reshape(found.shape)
         # at the rim |w| vanishes and with it all light but the mirror's
         level = exact.mean(axis=(1, 2), keepdims=True) + 1e-7
-        assert np.max(np.abs(found - exact) / (exact + level)) < tolerance
+        worst = max(worst, float(np.max(np.abs(found - exact) / (exact + level))))
+    return worst
+
+
+@pytest.mark.parametrize("w_terms", [8, 12])
+@pytest.mark.parametrize(("range_nm", "tolerance"), [((380.0, 780.0), 6e-3), ((500.0, 560.0), 2.5e-2)])
+def test_a_ring_holds_the_integral_over_wavelengths(
+    w_terms: int, range_nm: tuple[float, float], tolerance: float
+) -> None:
+    """Nodes of w by eight and by four. A narrow range averages less of what the radii's distance leaves."""
+    field = rough()
+    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
+    assert integral_error(field, power, trapezoid(Spectrum(range_nm=range_nm), 5.0), w_terms) < tolerance
+
+
+@pytest.mark.parametrize("step_nm", [60.0, 20.0])
+def test_few_wavelengths_are_their_own_points(step_nm: float) -> None:
+    """Nothing averages what interpolation leaves: radii are as near as for a line."""
+    field, light = rough(), Spectrum(range_nm=(500.0, 560.0))
+    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, spectrum.SPACING_OF_A_LINE)
+    rule = trapezoid(light, step_nm)
+    rules = quadrature.uniform(rule, len(RHO))
+    nodes = power.values.shape[2]
+    points = spectral_integral.line_points(power.radius_per_um, nodes, power.s_max_per_um, RHO, rules)
+    assert points.on_nodes.all()
+    np.testing.assert_allclose(1e3 / points.kappa_per_um[: points.count[0]], rule.lambda_nm[::-1])
+    assert integral_error(field, power, rule, 8) < 4e-3
 
 
 @pytest.mark.parametrize("height", [0.05, 0.6])
