@@ -90,6 +90,8 @@ def _by_table(quick: bool) -> Iterator[Cell]:
     yield replace(base, kind="spike", height_um=1.0)
     yield replace(base, kind="steps", height_um=1e-3)
     yield replace(base, kind="hills", height_um=2.0)
+    # the spectral integral has more wavelengths to follow than radii
+    yield replace(base, kind="hills", height_um=6.0)
     yield replace(base, shape=(128, 96), pitch_um=(0.05, 0.1))
     yield replace(base, shape=(128, 128), pitch_um=(0.2, 0.2), sigma_um=6.4)
     yield replace(base, sigma_um=0.8)
