@@ -10,7 +10,6 @@ from kernels.diffraction import fourth_column
 from kernels.polar_spectrum import LANES
 
 ORDER = 8  # nodes of every interpolation, over r and along kappa
-_RINGS_TOGETHER = 8  # neighbours read almost the same radii of E, which stay in a core's cache meanwhile
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,7 @@ def integrate(
     to_w_terms = device.upload(chebyshev(w_terms)[0].astype(np.float32))
     out = device.empty((rings, 3 * w_terms, LANES * tiles), np.float32)
     power, result = device.lent(spectrum), device.shared(out)
-    size = _RINGS_TOGETHER, tiles // 2, -(-rings // _RINGS_TOGETHER)
-    program.launch("apply_operator", size, power, np.int32(radii), np.int32(rings), *operator, to_w_terms, result)
+    program.launch("apply_operator", (rings, tiles // 2), power, np.int32(radii), *operator, to_w_terms, result)
     return device.settle(result, out)
 
 

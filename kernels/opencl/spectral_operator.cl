@@ -177,20 +177,17 @@ static void add_shares(const float16 (*line)[W_TERMS][2], const int points, cons
     UNROLL for (int q = 0; q < 24; ++q) sum[q / 8][m + q / 2 % 4][q % 2] = part[q / 8][q / 2 % 4][q % 2];
 }
 
-/* The table of one ring, at the sixteen azimuths of a tile and those half a turn on. Work-items: rings of a group, tiles
- * of half a turn, groups of rings.
+/* The table of one ring, at the sixteen azimuths of a tile and those half a turn on. One work-item, one ring and one
+ * tile of half a turn.
  *
  *   spectrum  float[2 * tiles][radii][S_NODES][16]   E, as polar_spectrum.cl writes it
  *   w_series  float[W_TERMS][W_TERMS]                Chebyshev coefficients from values at the nodes, [term][w node]
- *   table     float[count][3][W_TERMS][16 * 2 * tiles]
+ *   table     float[rings][3][W_TERMS][16 * 2 * tiles]
  */
-__kernel void apply_operator(__global const float *spectrum, const int radii, const int count,
-                             __global const Ring *rings, __global const int *place, __global const float *along_r,
-                             __global const float *along_s, __global const float *shares,
-                             __global const float *w_series, __global float *table) {
-    const int i = get_global_size(0) * get_global_id(2) + get_global_id(0);
-    const int tile = get_global_id(1), tiles = get_global_size(1);
-    if (i >= count) return;
+__kernel void apply_operator(__global const float *spectrum, const int radii, __global const Ring *rings,
+                             __global const int *place, __global const float *along_r, __global const float *along_s,
+                             __global const float *shares, __global const float *w_series, __global float *table) {
+    const int i = get_global_id(0), tile = get_global_id(1), tiles = get_global_size(1);
     const Ring ring = rings[i];
     __global const float *here = spectrum + (long)tile * radii * S_NODES * 16;
     __global const float *opposite = here + (long)tiles * radii * S_NODES * 16;
