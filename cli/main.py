@@ -72,7 +72,8 @@ def process() -> None:
     with contextlib.suppress(OSError):
         sys.stdout.flush()
         sys.stderr.flush()
-    os._exit(code if isinstance(code, int) else 0)
+    # as the interpreter ends: nothing is 0, and words are a failure
+    os._exit(code if isinstance(code, int) else int(code is not None))
 
 
 def main() -> None:

@@ -82,7 +82,7 @@ class Setting:
         lit = partial(brdf.illumination, self.config.material, light, self.sigma_um)
         return quadrature.choose(lit, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
 
-    @property
+    @cached_property
     def points(self) -> LinePoints:
         """Where the rings take E."""
         s_max, rho = spectrum.s_max(self.lambda_min_nm), self.plan.rings.rho()
