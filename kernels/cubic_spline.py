@@ -9,18 +9,14 @@ from kernels import device
 from kernels.diffraction import fourth_column
 from kernels.polar_spectrum import LANES
 
-_RINGS = 32  # of a column that one work-item filters
-
 
 def coefficients(table: np.ndarray) -> np.ndarray:
     """Cubic B-spline coefficients of a table (rings, outputs, azimuths) of samples, in its place."""
     rings, outputs, azimuths = table.shape
     program = _program(outputs)
-    between = device.result_buffer(table.nbytes)
     buffer = device.shared(table)
-    program.launch("filter_azimuths", (outputs, rings), buffer, np.int32(azimuths), between)
-    blocks = azimuths // LANES, -(-rings // _RINGS), outputs
-    program.launch("filter_rings", blocks, between, np.int32(rings), buffer)
+    program.launch("filter_azimuths", (outputs, rings), buffer, np.int32(azimuths))
+    program.launch("filter_rings", (azimuths // (2 * LANES), outputs), buffer, np.int32(rings))
     return device.settle(buffer, table)
 
 
@@ -45,4 +41,4 @@ def look_up(table: np.ndarray, ring: np.ndarray, azimuth: np.ndarray, x: np.ndar
 
 
 def _program(outputs: int) -> device.Program:
-    return device.program(("cubic_spline.cl",), {"OUT": outputs, "W_TERMS": outputs // 3, "RINGS": _RINGS})
+    return device.program(("cubic_spline.cl",), {"OUT": outputs, "W_TERMS": outputs // 3})

@@ -25,7 +25,7 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     tiles = azimuth_rad.reshape(-1, LANES)
     directions = np.stack([np.cos(tiles), np.sin(tiles)], axis=1)
     constants = {key: stack.constants[key] for key in ("BLOCKS", "REACH_X", "REACH_Y")}
-    constants |= {"S_NODES": nodes, "S_BLOCK": s_block, "RADII": _RADII}
+    constants |= {"TERMS": terms + terms % 2, "S_NODES": nodes, "S_BLOCK": s_block, "RADII": _RADII}
     program = device.program(("polar_spectrum.cl",), constants)
     radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))
     out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)

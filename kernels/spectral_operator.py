@@ -10,6 +10,7 @@ from kernels.diffraction import fourth_column
 from kernels.polar_spectrum import LANES
 
 ORDER = 8  # nodes of every interpolation, over r and along kappa
+MOST_RINGS = 8  # of a group, whose sums stay in the nearest cache
 
 
 @dataclass(frozen=True)
@@ -27,20 +28,33 @@ class RingQuadratures:
 
 @dataclass(frozen=True)
 class LinePoints:
-    """Where along kappa = 1 / lambda every ring takes E, one ring after the other.
+    """Where rings take E along kappa = 1 / lambda: as groups that follow each other, on a group's first ring's line.
 
-    kappa_per_um: (points,) ascending in each ring. place: (points,) the radius r = rho kappa, or the first of the
-    ORDER about it, negative below the origin. first, count: (rings,) where a ring's begin and how many they are.
-    on_radii: (rings,) whether they lie on radii of E. on_nodes: (rings,) whether they are the ring's wavelengths;
-    else they are ORDER or more.
+    kappa_per_um: (points,) ascending in each group. place: (points,) the radius r = rho kappa, or the first of the
+    ORDER about it, negative below the origin. first, count: (groups,) where a group's begin and how many they are.
+    rings: (groups,) how many rings, at most MOST_RINGS. on_radii: (groups,) whether they lie on radii of E. on_nodes:
+    (groups,) whether they are the wavelengths of the group's one ring; else they are ORDER or more. stretch: (rings,)
+    rho over that of the group's first.
     """
 
     kappa_per_um: np.ndarray
     place: np.ndarray
     first: np.ndarray
     count: np.ndarray
+    rings: np.ndarray
     on_radii: np.ndarray
     on_nodes: np.ndarray
+    stretch: np.ndarray
+
+    @property
+    def group(self) -> np.ndarray:
+        """The group of every ring, (rings,)."""
+        return np.repeat(np.arange(len(self.rings)), self.rings)
+
+    @property
+    def first_ring(self) -> np.ndarray:
+        """The first ring of every group, (groups,)."""
+        return np.asarray(np.cumsum(self.rings) - self.rings)
 
 
 def integrate(
@@ -55,15 +69,16 @@ def integrate(
     """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from `polar_spectrum`'s E.
 
     `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,). `reflectance` (nodes of all rings'
-    rules one after the other, w_terms) multiplies E at `w_nodes`; w_terms is a multiple of 4.
+    rules one after the other, w_terms) multiplies E at `group_w`; w_terms is a multiple of 4.
     """
     tiles, radii, s_nodes, _ = spectrum.shape
     w_terms, rings = reflectance.shape[1], len(rho)
     program, operator = _operator(radius_per_um, s_nodes, s_max_per_um, rho, points, quadratures, reflectance)
-    to_w_terms = device.upload(chebyshev(w_terms)[0].astype(np.float32))
+    to_w_terms = device.upload(_to_w_terms(rho, points, w_terms).astype(np.float32))
     out = device.empty((rings, 3 * w_terms, LANES * tiles), np.float32)
     power, result = device.lent(spectrum), device.shared(out)
-    program.launch("apply_operator", (rings, tiles // 2), power, np.int32(radii), *operator, to_w_terms, result)
+    size = len(points.rings), tiles // 2
+    program.launch("apply_operator", size, power, np.int32(radii), *operator, to_w_terms, result)
     return device.settle(result, out)
 
 
@@ -76,35 +91,71 @@ def _operator(
     quadratures: RingQuadratures,
     reflectance: np.ndarray,
 ) -> tuple[device.Program, list[Any]]:
-    """The program, and the operator of every ring from E on `s_nodes`: rings, places and weights on the device."""
+    """The program, and the operator of every group from E on `s_nodes`, on the device, in the kernels' order."""
     w_terms = reflectance.shape[1]
-    constants = {"ORDER": ORDER, "S_NODES": s_nodes, "W_TERMS": w_terms, "W_BLOCK": 4 if w_terms % 8 else 8}
+    constants = {
+        "ORDER": ORDER,
+        "S_NODES": s_nodes,
+        "W_TERMS": w_terms,
+        "W_BLOCK": 4 if w_terms % 8 else 8,
+        "MOST_RINGS": MOST_RINGS,
+    }
     program = device.program(("spectral_operator.cl",), constants)
-    where = [device.upload(a) for a in (_rings(points, quadratures), points.place.astype(np.int32))]
+    where = [device.upload(a.astype(np.int32)) for a in (_groups(points), _rings(points, quadratures), points.place)]
     inputs = [
         device.upload(a)
         for a in (
             radius_per_um,
             rho,
+            points.stretch,
             points.kappa_per_um,
             quadratures.lambda_um,
             fourth_column(quadratures.weights).astype(np.float32),
-            reflectance.astype(np.float32),
+            reflectance.astype(np.float32, copy=False),
             chebyshev(s_nodes)[0].astype(np.float32),
             w_nodes(w_terms).astype(np.float32),
         )
     ]
-    floats = ORDER, s_nodes * w_terms, 3 * w_terms
-    weights = [device.result_buffer(4 * len(points.place) * n) for n in floats]
-    program.launch("build_operator", (len(rho),), *where, *inputs, np.float32(s_max_per_um), *weights)
+    count, shares = len(points.place), int(points.rings @ points.count)
+    floats = count * ORDER, count * s_nodes * w_terms, shares * 3 * w_terms, 2 * len(rho)
+    weights = [device.result_buffer(4 * n) for n in floats]
+    program.launch("build_operator", (len(points.rings),), *where, *inputs, np.float32(s_max_per_um), *weights)
     return program, [*where, *weights]
 
 
+def _groups(points: LinePoints) -> np.ndarray:
+    """The kernels' Group of every group, (groups, 6)."""
+    where = points.first, points.count, points.on_radii, points.on_nodes, points.first_ring, points.rings
+    return np.stack(where, axis=-1)
+
+
 def _rings(points: LinePoints, quadratures: RingQuadratures) -> np.ndarray:
-    """The kernels' Ring of every ring, int32 (rings, 7)."""
-    reflected = np.concatenate([[0], np.cumsum(quadratures.count)[:-1]])
-    where = points.first, points.count, points.on_radii, points.on_nodes
-    return np.stack([*where, quadratures.first, quadratures.count, reflected], axis=-1).astype(np.int32)
+    """The kernels' Ring of every ring, (rings, 4)."""
+    shares, count = points.count[points.group], quadratures.count
+    where = np.cumsum(shares) - shares, quadratures.first, count, np.cumsum(count) - count
+    return np.stack(where, axis=-1)
+
+
+def _to_w_terms(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
+    """Chebyshev coefficients over every ring's w from values at its group's nodes, (rings, w_terms, w_terms)."""
+    to_terms, x = chebyshev(w_terms)
+    w_max, reach = _w_max(rho), points.stretch * _w_max(rho)[points.first_ring][points.group]
+    # at the rim all nodes are one
+    share = np.divide(w_max, reach, out=np.ones_like(rho), where=reach > 0.0)
+    own = share[:, None] * (x + 1.0) - 1.0
+    through = np.cos(np.arange(w_terms) * np.arccos(np.minimum(own, 1.0))[..., None]) @ to_terms
+    return np.asarray(to_terms @ through)
+
+
+def group_w(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
+    """|w| of every ring where its group takes E, (rings, w_terms); beyond a ring's own w_max it goes on."""
+    first = points.first_ring[points.group]
+    return np.outer(points.stretch * _w_max(rho)[first], w_nodes(w_terms))
+
+
+def _w_max(rho: np.ndarray) -> np.ndarray:
+    """The largest |w| of every ring."""
+    return np.sqrt(np.maximum(4.0 - rho**2, 0.0))
 
 
 def w_nodes(w_terms: int) -> np.ndarray:

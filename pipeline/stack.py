@@ -34,7 +34,8 @@ class Stack:
 
     The other half is its conjugate, for heights are real. The sign is Stam's.
 
-    coefficients: float64 or float32 (rows, columns, 2, terms): real and imaginary part, terms side by side.
+    coefficients: float64 or float32 (rows, columns, 2, terms or more): real and imaginary part, terms side by side.
+    terms: of the series; what the coefficients hold beyond fills vectors.
     row_zero, column_zero: where psi = 0 and phi = 0 stand; phi starts `reach` coefficients below 0.
     spacing_per_um: (dphi, dpsi), 1/um: one over the patch's size.
     reach: coefficients (x, y) that the window's transform needs on either side of the nearest one.
@@ -43,6 +44,7 @@ class Stack:
 
     basis: Basis
     coefficients: NDArray[Any]
+    terms: int
     row_zero: int
     column_zero: int
     spacing_per_um: tuple[float, float]
@@ -50,10 +52,6 @@ class Stack:
     half_range_um: float
     sigma_um: float
     band_per_um: tuple[float, float]
-
-    @property
-    def terms(self) -> int:
-        return int(self.coefficients.shape[3])
 
 
 def build(
@@ -93,7 +91,7 @@ def build(
         device.empty(shape, dtype),
         lambda done: progress("stack", done),
     )
-    return Stack(basis, coefficients, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
+    return Stack(basis, coefficients, terms, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
 
 
 def _check_window(sigma_um: float, pitch_um: tuple[float, float]) -> None:

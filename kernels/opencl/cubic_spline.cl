@@ -1,39 +1,60 @@
 /* Cubic B-splines through the samples of a polar table, and their look-up.
  *
- * Coefficients come from samples by the filter sqrt(3) z^|k|, z = sqrt(3) - 2, cut at 2e-7 (Unser 1993);
+ * Coefficients come from samples by the filter sqrt(3) z^|k|, z = sqrt(3) - 2 (Unser 1993), once along each axis;
  * the spline through (..., c_(i-1), c_i, c_(i+1), c_(i+2), ...) has the four weights of `spline`. Between samples that is half
  * the error of Catmull-Rom, and its weights are positive: four bilinear fetches make one bicubic.
  *
  *   table   float[rings][OUT][azimuths]     outputs of the spectral operator; azimuths is a multiple of 32
  *
  * Rings go on below the first, which is one point, as the opposite half turn: (-i, a) = (i, a + azimuths / 2); beyond the
- * last they are mirrored. Azimuths are periodic. Set by the host: OUT = 3 W_TERMS outputs of a look-up; RINGS that
- * one work-item filters.
+ * last they are mirrored. Azimuths are periodic. Set by the host: OUT = 3 W_TERMS outputs of a look-up.
  */
 
-#define TAIL 12
-#define BLOCK 256
-#define UNROLL _Pragma("unroll")
+#define Z (-0.26794919f)
+#define Z2 (Z * Z)
+#define Z4 (Z2 * Z2)
+#define Z8 (Z4 * Z4)
+#define BLOCK 16  /* vectors of a row that wait in the nearest cache */
+#define RINGS 32  /* of a column that wait there */
+#define AHEAD 16
 
-/* sqrt(3) z^k */
-__constant float weight_of[TAIL + 1] = {1.7320508e+00f, -4.6410162e-01f, 1.2435565e-01f, -3.3320996e-02f, 8.9283340e-03f,
-                                        -2.3923399e-03f, 6.4102553e-04f, -1.7176227e-04f, 4.6023562e-05f, -1.2331976e-05f,
-                                        3.3043430e-06f, -8.8539606e-07f, 2.3724117e-07f};
+/* One factor of sum_k z^|k| d^k, d a step along the row. That sum is 1 - z^2 times the product over n = 1, 2, 4, ... of
+ * (1 + z^n d^n) (1 + z^n d^-n) = (1 + z^2n) (1 + q (d^n + d^-n)), q = z^n / (1 + z^2n); what n = 16 adds is 7e-10. */
+#define FACTOR(name, before, after, zn)                                                                                \
+    static void name(float16 *line, const int vectors) {                                                               \
+        const float q = zn / (1.0f + zn * zn);                                                                         \
+        float16 a = 0.0f, x = line[0];                                                                                 \
+        for (int i = 0; i < vectors; ++i) {                                                                            \
+            const float16 b = i + 1 < vectors ? line[i + 1] : (float16)0.0f;                                           \
+            line[i] = fma((float16)q, before + after, x);                                                              \
+            a = x;                                                                                                     \
+            x = b;                                                                                                     \
+        }                                                                                                              \
+    }
+FACTOR(factor_1, (float16)(a.sf, x.s01234567, x.s89ab, x.scd, x.se), (float16)(x.s1, x.s23, x.s4567, x.s89abcdef, b.s0), Z)
+FACTOR(factor_2, (float16)(a.sef, x.s01234567, x.s89ab, x.scd), (float16)(x.s23, x.s4567, x.s89abcdef, b.s01), Z2)
+FACTOR(factor_4, (float16)(a.scdef, x.s01234567, x.s89ab), (float16)(x.s4567, x.s89abcdef, b.s0123), Z4)
+FACTOR(factor_8, (float16)(a.hi, x.lo), (float16)(x.hi, b.lo), Z8)
 
-/* Around the turn. One work-item, one ring and output; lines of BLOCK azimuths with their neighbours on either side. */
-__kernel void filter_azimuths(__global const float *in, const int azimuths, __global float *out) {
-    const long row = (long)(get_global_id(1) * get_global_size(0) + get_global_id(0)) * azimuths;
-    for (int from = 0; from < azimuths; from += BLOCK) {
-        const int to = min(from + BLOCK, azimuths);
-        float line[BLOCK + 32];
-        for (int i = from - 16; i < to + 16; i += 16)
-            vstore16(vload16(0, in + row + (i + azimuths) % azimuths), 0, line + i - from + 16);
-        for (int i = from; i < to; i += 16) {
-            const float *at = line + i - from + 16;
-            float16 sum = weight_of[0] * vload16(0, at);
-            UNROLL for (int k = 1; k <= TAIL; ++k) sum += weight_of[k] * (vload16(0, at - k) + vload16(0, at + k));
-            vstore16(sum, 0, out + row + i);
-        }
+/* Around the turn, in place. One work-item, one ring and output: a row, BLOCK vectors at a time with one on either side,
+ * where 15 lanes suffice. */
+__kernel void filter_azimuths(__global float *table, const int azimuths) {
+    __global float *row = table + (long)(get_global_id(1) * get_global_size(0) + get_global_id(0)) * azimuths;
+    const int vectors = azimuths / 16;
+    const float gain = sqrt(3.0f) * (1.0f - Z2) * (1.0f + Z2) * (1.0f + Z4) * (1.0f + Z8) * (1.0f + Z8 * Z8);
+    const float16 first = vload16(0, row);
+    float16 before = vload16(vectors - 1, row), line[BLOCK + 2];
+    for (int from = 0; from < vectors; from += BLOCK) {
+        const int count = min(BLOCK, vectors - from);
+        line[0] = before;
+        for (int i = 0; i < count; ++i) line[i + 1] = vload16(from + i, row);
+        line[count + 1] = from + count < vectors ? vload16(from + count, row) : first;
+        before = line[count];
+        factor_8(line, count + 2);
+        factor_4(line, count + 2);
+        factor_2(line, count + 2);
+        factor_1(line, count + 2);
+        for (int i = 0; i < count; ++i) vstore16(gain * line[i + 1], from + i, row);
     }
 }
 
@@ -44,21 +65,45 @@ static int ring_of(int ring, const int rings, int *opposite) {
     return clamp(ring < rings ? ring : 2 * (rings - 1) - ring, 0, rings - 1);
 }
 
-/* Across the rings. One work-item, sixteen azimuths of one output, RINGS rings with their neighbours on either side. */
-__kernel void filter_rings(__global const float *in, const int rings, __global float *out) {
-    const int tile = get_global_id(0), tiles = get_global_size(0), output = get_global_id(2), outputs = get_global_size(2);
-    const int from = RINGS * get_global_id(1), to = min(from + RINGS, rings);
-    float16 column[RINGS + 2 * TAIL];
-    for (int i = from - TAIL; i < to + TAIL; ++i) {
+/* Across the rings, in place: a recursion outwards and one back, over RINGS at a time, whose way back begins AHEAD of
+ * them. One work-item, one output, sixteen azimuths of half a turn and those opposite: their rings below the first. */
+__kernel void filter_rings(__global float *table, const int rings) {
+    const int tile = get_global_id(0), tiles = get_global_size(0), output = get_global_id(1), outputs = get_global_size(1);
+    const long ring = 2 * (long)outputs * tiles;
+    __global float *here = table + (2 * output * tiles + tile) * 16, *there = here + tiles * 16;
+
+    float16 a = 0.0f, b = 0.0f;
+    for (int i = -AHEAD; i < 0; ++i) {
         int opposite;
-        const long row = (long)ring_of(i, rings, &opposite) * outputs + output;
-        column[i - from + TAIL] = vload16(row * tiles + (opposite ? (tile + tiles / 2) % tiles : tile), in);
+        const long row = ring * ring_of(i, rings, &opposite);
+        a = fma((float16)Z, a, vload16(row, there));
+        b = fma((float16)Z, b, vload16(row, here));
     }
-    for (int i = from; i < to; ++i) {
-        const float16 *at = column + i - from + TAIL;
-        float16 sum = weight_of[0] * at[0];
-        UNROLL for (int k = 1; k <= TAIL; ++k) sum += weight_of[k] * (at[-k] + at[k]);
-        vstore16(sum, ((long)i * outputs + output) * tiles + tile, out);
+    for (int from = 0; from < rings; from += RINGS) {
+        const int count = min(RINGS, rings - from), seen = min(RINGS + AHEAD, rings - from);
+        float16 out[RINGS + AHEAD + 1][2];
+        out[0][0] = a;
+        out[0][1] = b;
+        for (int i = 0; i < seen; ++i) {
+            out[i + 1][0] = fma((float16)Z, out[i][0], vload16(ring * (from + i), here));
+            out[i + 1][1] = fma((float16)Z, out[i][1], vload16(ring * (from + i), there));
+        }
+        /* the last is mirrored: c_n = (z out_(n-2) + z^2 out_(n-1)) / (z^2 - 1); elsewhere AHEAD forgets what c_n is */
+        float16 a_back = 0.0f, b_back = 0.0f;
+        if (from + seen == rings) {
+            a_back = (Z * out[seen - 1][0] + Z2 * out[seen][0]) / (Z2 - 1.0f);
+            b_back = (Z * out[seen - 1][1] + Z2 * out[seen][1]) / (Z2 - 1.0f);
+        }
+        for (int i = seen - 1; i >= 0; --i) {
+            a_back = Z * (a_back - out[i + 1][0]);
+            b_back = Z * (b_back - out[i + 1][1]);
+            if (i < count) {
+                vstore16(6.0f * a_back, ring * (from + i), here);
+                vstore16(6.0f * b_back, ring * (from + i), there);
+            }
+        }
+        a = out[count][0];
+        b = out[count][1];
     }
 }
 

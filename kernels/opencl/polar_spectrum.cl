@@ -18,7 +18,7 @@
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
  * the point. One work-item, RADII radii and the sixteen azimuths of a tile.
  *
- * Set by the host: BLOCKS of 16 terms, S_NODES and S_BLOCK of them, RADII, REACH_X and REACH_Y.
+ * Set by the host: TERMS, even, in BLOCKS of 16, S_NODES and S_BLOCK of them, RADII, REACH_X and REACH_Y.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
@@ -151,6 +151,7 @@ static __attribute__((always_inline)) void power_at_nodes(const float16 (*re)[16
     for (int b = 0; b < BLOCKS; ++b)
         UNROLL for (int n = 0; n < 16; n += 2) {
             __global const float *even = series + (16 * b + n) * S_NODES, *odd = even + S_NODES;
+            if (16 * b + n >= TERMS) break;
             UNROLL for (int j = 0; j < nodes; ++j) {
                 even_re[j] = fma((float16)even[j], re[b][n], even_re[j]);
                 even_im[j] = fma((float16)even[j], im[b][n], even_im[j]);

@@ -11,21 +11,28 @@
  *   G(p, w) = sum_j C_j(2 pi |w| kappa_p) E(rho kappa_p, s_j)
  *   I(w)    = sum_p shares[p] G(p, w),   shares[p] = sum_l weights[l] L_p(1 / l)
  *
- * Where a ring's points are chosen on radii of E (rho kappa_p = r_a) nothing is interpolated over r; where they are its
- * wavelengths, nothing along the line.
+ * Where points are chosen on radii of E (rho kappa_p = r_a) nothing is interpolated over r; where they are a ring's
+ * wavelengths, nothing along the line. A ring t rho has the same lines at t w, where its wavelengths lie at t / l: rings
+ * that follow each other share G, as a group, at nodes w_m of its first ring; what I is at nodes of a ring's own follows
+ * from the polynomial through these.
  *
- * Set by the host: ORDER (even); S_NODES; W_TERMS, a multiple of W_BLOCK, and W_BLOCK, 4 or 8.
+ * Set by the host: ORDER (even); S_NODES; W_TERMS, a multiple of W_BLOCK, and W_BLOCK, 4 or 8; MOST_RINGS of a group.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
-#define CHUNK 16  /* points whose G waits in the nearest cache */
+#define CHUNK 24  /* points whose G waits in the nearest cache */
 
 typedef struct {
-    int first, points;   /* of the ring, among those of all rings */
+    int first, points;   /* among those of all groups */
     int on_radii;        /* whether they lie on radii of E */
-    int on_nodes;        /* whether they are the wavelengths themselves, from the last to the first */
-    int nodes, count;    /* where the ring's quadrature begins, and its length */
+    int on_nodes;        /* whether they are the wavelengths themselves, from the last to the first, of its one ring */
+    int ring, rings;     /* the first, and how many */
+} Group;
+
+typedef struct {
+    int shares;          /* where its rows of `shares` begin, one for every point of its group */
+    int nodes, count;    /* where its quadrature begins, and its length */
     int reflected;       /* where its rows of `reflectance` begin */
 } Ring;
 
@@ -34,46 +41,82 @@ static double node(__global const double *radius, const int i) { return i < 0 ? 
 
 /* Lagrange's polynomials on the ORDER nodes at `x`, at `at` */
 static void lagrange(const double *x, const double at, float *weight) {
-    for (int a = 0; a < ORDER; ++a) {
-        double above = 1.0, below = 1.0;
-        for (int b = 0; b < ORDER; ++b)
-            if (b != a) {
-                above *= at - x[b];
-                below *= x[a] - x[b];
-            }
-        weight[a] = above / below;
-    }
+    double above[ORDER], below[ORDER];
+    for (int a = 0; a < ORDER; ++a) above[a] = below[a] = 1.0;
+    UNROLL for (int b = 0; b < ORDER; ++b)
+        UNROLL for (int a = 0; a < ORDER; ++a) {
+            above[a] *= a == b ? 1.0 : at - x[b];
+            below[a] *= a == b ? 1.0 : x[a] - x[b];
+        }
+    for (int a = 0; a < ORDER; ++a) weight[a] = above[a] / below[a];
 }
 
-/* The operator of each ring. One work-item, one ring.
+/* What one ring takes of each of its group's points. Wavelengths ascend, so the points about them descend. */
+static void share_points(const Group group, const Ring ring, const double stretch, __global const double *line,
+                         __global const double *lambda, __global const float4 *weights,
+                         __global const float *reflectance, __global float *shares, __global int2 *span) {
+    const int about = group.on_nodes ? 1 : ORDER;
+    int first = group.points - about;
+    for (int o = 0; o < group.points * 3 * W_TERMS; ++o) shares[o] = 0.0f;
+    for (int l = 0; l < ring.count; ++l) {
+        float weight[ORDER] = {1.0f};
+        if (group.on_nodes)
+            first = group.points - 1 - l;
+        else {
+            const double at = stretch / lambda[ring.nodes + l];
+            while (first > 0 && line[first + ORDER / 2 - 1] > at) --first;
+            double x[ORDER];
+            for (int a = 0; a < ORDER; ++a) x[a] = line[first + a];
+            lagrange(x, at, weight);
+        }
+        if (l == 0) span->y = first + about;
+        const float4 xyz = weights[ring.nodes + l];
+        const float channel[3] = {xyz.x, xyz.y, xyz.z};
+        __global const float *reflected = reflectance + (long)(ring.reflected + l) * W_TERMS;
+        for (int a = 0; a < about; ++a)
+            for (int c = 0; c < 3; ++c)
+                for (int m = 0; m < W_TERMS; m += 4) {
+                    __global float *share = shares + ((first + a) * 3 + c) * W_TERMS + m;
+                    vstore4(fma((float4)(channel[c] * weight[a]), vload4(0, reflected + m), vload4(0, share)), 0, share);
+                }
+    }
+    span->x = first;
+}
+
+/* The operator of each group of rings. One work-item, one group.
  *
  *   place     int[points]            the radius of a point, or the first of the ORDER about it: may be negative
  *   radius    double[radii]          r_a, 1/um, ascending from 0
  *   rho       double[rings]
- *   kappa     double[points]         ascending in each ring, 1/um
+ *   stretch   double[rings]          t, of the ring over its group's first
+ *   kappa     double[points]         ascending in each group, 1/um
  *   lambda    double[], weights float4[]    um; X, Y, Z: the nodes of every ring's quadrature
- *   reflectance  float[...][W_TERMS] of the material at each wavelength of a ring and each node of w; 1 outside metals
+ *   reflectance  float[...][W_TERMS] of the material at each wavelength of a ring and each of its group's nodes of w;
+ *                                    1 outside metals
  *   cardinal  float[S_NODES][S_NODES]    C_j = sum_k cardinal[k][j] T_k
- *   w_node    float[W_TERMS]         nodes of w in [0, 1], shares of w_max
+ *   w_node    float[W_TERMS]         nodes of w in [0, 1], shares of the first ring's w_max
  *   along_r   float[points][ORDER]   L_a of a point between radii
  *   along_s   float[points][S_NODES][W_TERMS]   C_j at every node of w
- *   shares    float[points][3][W_TERMS]
+ *   shares    float[points of its group, for every ring][3][W_TERMS]
+ *   span      int2[rings]            the points of its group that a ring takes from, and the end of them
  */
-__kernel void build_operator(__global const Ring *rings, __global const int *place, __global const double *radius,
-                             __global const double *rho, __global const double *kappa, __global const double *lambda,
+__kernel void build_operator(__global const Group *groups, __global const Ring *rings, __global const int *place,
+                             __global const double *radius, __global const double *rho, __global const double *stretch,
+                             __global const double *kappa, __global const double *lambda,
                              __global const float4 *weights, __global const float *reflectance,
                              __global const float *cardinal, __global const float *w_node, const float s_max,
-                             __global float *along_r, __global float *along_s, __global float *shares) {
-    const int i = get_global_id(0);
-    const Ring ring = rings[i];
-    const float w_max = sqrt(fmax(4.0 - rho[i] * rho[i], 0.0));
-    double x[ORDER];
+                             __global float *along_r, __global float *along_s, __global float *shares,
+                             __global int2 *span) {
+    const Group group = groups[get_global_id(0)];
+    const double from = rho[group.ring];
+    const float w_max = sqrt(fmax(4.0 - from * from, 0.0));
 
-    for (int p = ring.first; p < ring.first + ring.points; ++p) {
-        if (!ring.on_radii) {
+    for (int p = group.first; p < group.first + group.points; ++p) {
+        if (!group.on_radii) {
+            double x[ORDER];
             for (int a = 0; a < ORDER; ++a) x[a] = node(radius, place[p] + a);
             float weight[ORDER];
-            lagrange(x, rho[i] * kappa[p], weight);
+            lagrange(x, from * kappa[p], weight);
             for (int a = 0; a < ORDER; ++a) along_r[p * ORDER + a] = weight[a];
         }
         const float scale = 2.0f * 2.0f * (float)M_PI * w_max * (float)kappa[p] / s_max;
@@ -89,35 +132,10 @@ __kernel void build_operator(__global const Ring *rings, __global const int *pla
                 vstore4(sum, 0, along_s + ((long)p * S_NODES + j) * W_TERMS + m);
             }
         }
-        for (int o = 0; o < 3 * W_TERMS; ++o) shares[p * 3 * W_TERMS + o] = 0.0f;
     }
-
-    /* wavelengths ascend, so the points about them descend */
-    __global const double *line = kappa + ring.first;
-    const int about = ring.on_nodes ? 1 : ORDER;
-    int first = ring.points - about;
-    for (int l = 0; l < ring.count; ++l) {
-        float weight[ORDER] = {1.0f};
-        if (ring.on_nodes)
-            first = ring.points - 1 - l;
-        else {
-            const double at = 1.0 / lambda[ring.nodes + l];
-            while (first > 0 && line[first + ORDER / 2 - 1] > at) --first;
-            for (int a = 0; a < ORDER; ++a) x[a] = line[first + a];
-            lagrange(x, at, weight);
-        }
-        const float4 xyz = weights[ring.nodes + l];
-        const float channel[3] = {xyz.x, xyz.y, xyz.z};
-        __global const float *reflected = reflectance + (long)(ring.reflected + l) * W_TERMS;
-        for (int a = 0; a < about; ++a) {
-            __global float *share = shares + (long)(ring.first + first + a) * 3 * W_TERMS;
-            for (int c = 0; c < 3; ++c)
-                for (int m = 0; m < W_TERMS; m += 4) {
-                    __global float *at_m = share + c * W_TERMS + m;
-                    vstore4(fma((float4)(channel[c] * weight[a]), vload4(0, reflected + m), vload4(0, at_m)), 0, at_m);
-                }
-        }
-    }
+    for (int i = group.ring; i < group.ring + group.rings; ++i)
+        share_points(group, rings[i], stretch[i], kappa + group.first, lambda, weights, reflectance,
+                     shares + (long)rings[i].shares * 3 * W_TERMS, span + i);
 }
 
 /* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
@@ -177,51 +195,62 @@ static void add_shares(const float16 (*line)[W_TERMS][2], const int points, cons
     UNROLL for (int q = 0; q < 24; ++q) sum[q / 8][m + q / 2 % 4][q % 2] = part[q / 8][q / 2 % 4][q % 2];
 }
 
-/* The table of one ring, at the sixteen azimuths of a tile and those half a turn on. One work-item, one ring and one
- * tile of half a turn.
+/* The table of one group of rings, at the sixteen azimuths of a tile and those half a turn on. One work-item, one group
+ * and one tile of half a turn.
  *
  *   spectrum  float[2 * tiles][radii][S_NODES][16]   E, as polar_spectrum.cl writes it
- *   w_series  float[W_TERMS][W_TERMS]                Chebyshev coefficients from values at the nodes, [term][w node]
+ *   w_series  float[rings][W_TERMS][W_TERMS]         Chebyshev coefficients over a ring's w from values at its group's
+ *                                                    nodes, [term][w node]
  *   table     float[rings][3][W_TERMS][16 * 2 * tiles]
  */
-__kernel void apply_operator(__global const float *spectrum, const int radii, __global const Ring *rings,
-                             __global const int *place, __global const float *along_r, __global const float *along_s,
-                             __global const float *shares, __global const float *w_series, __global float *table) {
-    const int i = get_global_id(0), tile = get_global_id(1), tiles = get_global_size(1);
-    const Ring ring = rings[i];
+__kernel void apply_operator(__global const float *spectrum, const int radii, __global const Group *groups,
+                             __global const Ring *rings, __global const int *place, __global const float *along_r,
+                             __global const float *along_s, __global const float *shares, __global const int2 *span,
+                             __global const float *w_series, __global float *table) {
+    const Group group = groups[get_global_id(0)];
+    const int tile = get_global_id(1), tiles = get_global_size(1);
     __global const float *here = spectrum + (long)tile * radii * S_NODES * 16;
     __global const float *opposite = here + (long)tiles * radii * S_NODES * 16;
 
-    float16 sum[3][W_TERMS][2];
-    for (int c = 0; c < 3; ++c)
-        for (int m = 0; m < W_TERMS; ++m) sum[c][m][0] = sum[c][m][1] = 0.0f;
-    for (int from = ring.first; from < ring.first + ring.points; from += CHUNK) {
-        const int points = min(CHUNK, ring.first + ring.points - from);
+    float16 sum[MOST_RINGS][3][W_TERMS][2];
+    for (int i = 0; i < group.rings; ++i)
+        for (int q = 0; q < 6 * W_TERMS; ++q) sum[i][q / (2 * W_TERMS)][q / 2 % W_TERMS][q % 2] = 0.0f;
+    for (int from = 0; from < group.points; from += CHUNK) {
+        const int to = min(from + CHUNK, group.points);
         float16 line[CHUNK][W_TERMS][2];
-        for (int p = 0; p < points; ++p) {
-            __global const float *weights = along_s + (long)(from + p) * S_NODES * W_TERMS;
-            if (ring.on_radii) {
-                const long at = (long)place[from + p] * S_NODES * 16;
+        for (int p = from; p < to; ++p) {
+            __global const float *weights = along_s + (long)(group.first + p) * S_NODES * W_TERMS;
+            const int at = place[group.first + p];
+            if (group.on_radii) {
+                const long row = (long)at * S_NODES * 16;
                 for (int m = 0; m < W_TERMS; m += W_BLOCK)
-                    along_line_on_radius(here + at, opposite + at, weights + m, line[p] + m);
+                    along_line_on_radius(here + row, opposite + row, weights + m, line[p - from] + m);
             } else {
                 float e_here[16 * S_NODES], e_opposite[16 * S_NODES];
-                between_radii(here, opposite, place[from + p], along_r + (from + p) * ORDER, e_here, e_opposite);
+                between_radii(here, opposite, at, along_r + (group.first + p) * ORDER, e_here, e_opposite);
                 for (int m = 0; m < W_TERMS; m += W_BLOCK)
-                    along_line_between_radii(e_here, e_opposite, weights + m, line[p] + m);
+                    along_line_between_radii(e_here, e_opposite, weights + m, line[p - from] + m);
             }
         }
-        for (int m = 0; m < W_TERMS; m += 4) add_shares(line, points, m, shares + (long)from * 3 * W_TERMS, sum);
+        for (int i = 0; i < group.rings; ++i) {
+            const int2 taken = span[group.ring + i];
+            const int first = max(from, taken.x), points = min(to, taken.y) - first;
+            __global const float *own = shares + (long)(rings[group.ring + i].shares + first) * 3 * W_TERMS;
+            if (points > 0)
+                for (int m = 0; m < W_TERMS; m += 4) add_shares(line + first - from, points, m, own, sum[i]);
+        }
     }
-    for (int c = 0; c < 3; ++c)
-        for (int k = 0; k < W_TERMS; ++k) {
-            float16 a = 0.0f, b = 0.0f;
-            for (int m = 0; m < W_TERMS; ++m) {
-                a = fma((float16)w_series[k * W_TERMS + m], sum[c][m][0], a);
-                b = fma((float16)w_series[k * W_TERMS + m], sum[c][m][1], b);
+    for (int i = 0; i < group.rings; ++i)
+        for (int c = 0; c < 3; ++c)
+            for (int k = 0; k < W_TERMS; ++k) {
+                __global const float *series = w_series + ((group.ring + i) * W_TERMS + k) * W_TERMS;
+                float16 a = 0.0f, b = 0.0f;
+                for (int m = 0; m < W_TERMS; ++m) {
+                    a = fma((float16)series[m], sum[i][c][m][0], a);
+                    b = fma((float16)series[m], sum[i][c][m][1], b);
+                }
+                __global float *row = table + (((long)(group.ring + i) * 3 + c) * W_TERMS + k) * 32 * tiles;
+                vstore16(a, tile, row);
+                vstore16(b, tile + tiles, row);
             }
-            __global float *row = table + (((long)i * 3 + c) * W_TERMS + k) * 32 * tiles;
-            vstore16(a, tile, row);
-            vstore16(b, tile + tiles, row);
-        }
 }

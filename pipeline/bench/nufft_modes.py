@@ -37,7 +37,7 @@ def make(setting: Setting) -> Modes:
     # the patch repeats under the window
     rows, columns = ((np.arange(len(g)) - len(g) // 2) % m for g, m in ((g_y, my), (g_x, mx)))
     under = np.multiply.outer(g_y / g_y.sum(), g_x / g_x.sum()).astype(np.float32)
-    values = np.empty((setting.needed_terms, len(g_y), len(g_x)), np.complex64)
+    values = np.empty((setting.plan.terms, len(g_y), len(g_x)), np.complex64)
     t = np.fft.ifftshift(field.heights_um / field.half_range_um)
     before, term = np.zeros_like(t), np.ones_like(t)
     for n in range(len(values)):

@@ -56,7 +56,7 @@ def polar_texel(
 
 def complex_coefficients(built: Stack) -> NDArray[np.complex128]:
     """The stack's coefficients (rows, columns, terms) as complex numbers."""
-    return np.asarray(built.coefficients[:, :, 0] + 1j * built.coefficients[:, :, 1])
+    return np.asarray(built.coefficients[:, :, 0, : built.terms] + 1j * built.coefficients[:, :, 1, : built.terms])
 
 
 def _transforms(built: Stack, coefficients: NDArray[np.complex128], f: Array) -> NDArray[np.complex128]:

@@ -83,7 +83,7 @@ def stages(setting: Setting, baked: PolarBake) -> list[Timed]:
     seconds = baked.kernel_s
     spline_s = seconds["filter_azimuths"] + seconds["filter_rings"]
     return [
-        Timed(work.stack(setting.field, baked.built, setting.needed_terms), baked.stages.stack),
+        Timed(work.stack(setting.field, baked.built), baked.stages.stack),
         Timed(work.spectrum(setting, baked.built, baked.made), seconds["polar_spectrum"]),
         Timed(work.build_operator(setting), seconds["build_operator"]),
         Timed(work.apply_operator(setting, baked.made, baked.table), seconds["apply_operator"]),

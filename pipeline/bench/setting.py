@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import jv
 
 from kernels.spectral_operator import LinePoints, RingQuadratures, w_nodes
-from pipeline import series, spectrum
+from pipeline import spectrum
 from pipeline.config import Config, LaserLine, PolarLayout, Spectrum
 from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
@@ -17,7 +17,7 @@ from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm
 from pipeline.spectrum import PolarSpectrum
 from pipeline.stack import Stack, crop_to_window
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import plan, polar, quadrature, spectral_integral
+from pipeline.tables import line_points, plan, polar, quadrature, spectral_integral
 from pipeline.tables.plan import Budget, Plan
 
 # what the terms, nodes and wavelengths of every polar table here are chosen for; its grid is given
@@ -60,12 +60,6 @@ class Setting:
         spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
         return spectrum.radii(self.sigma_um, self.r_max_per_um, spacing)
 
-    @property
-    def needed_terms(self) -> int:
-        """Terms that the budget asks for; the plan fills whole vectors."""
-        z = series.largest_phase(self.field.half_range_um, self.lambda_min_nm)
-        return min(self.plan.terms, series.chebyshev_order(z, AMPLITUDE) + 1)
-
     def stack(self) -> Stack:
         reach = float(self.radius_per_um[-1])
         return spectrum.chebyshev_stack(self.field, self.sigma_um, reach, self.plan.terms, AMPLITUDE)
@@ -86,7 +80,7 @@ class Setting:
     def points(self) -> LinePoints:
         """Where the rings take E."""
         s_max, rho = spectrum.s_max(self.lambda_min_nm), self.plan.rings.rho()
-        return spectral_integral.line_points(self.radius_per_um, self.plan.s_nodes, s_max, rho, self.rules)
+        return line_points.choose(self.radius_per_um, self.plan.s_nodes, s_max, rho, self.rules)
 
     def table(self, made: PolarSpectrum, light: Spectrum) -> polar.PolarTable:
         reflectance = partial(brdf.spectral_reflectance, self.config.material, light)
@@ -94,20 +88,25 @@ class Setting:
 
     def samples(self, made: PolarSpectrum) -> NDArray[np.float64]:
         """The table's samples (rings, 3, w nodes, azimuths) before splines are put through them."""
-        rho = self.plan.rings.rho()
-        terms = spectral_integral.integrate(
-            made.values, made.radius_per_um, made.s_max_per_um, rho, self.rules, self._reflectance
-        )
+        of = made.values, made.radius_per_um, made.s_max_per_um, self.plan.rings.rho(), self.rules
+        reflectance = partial(brdf.spectral_reflectance, self.config.material, self.light)
+        terms = spectral_integral.integrate(*of, self.plan.w_terms, reflectance)
         # T_k at the nodes of w, (w node, k)
         x = 2.0 * w_nodes(self.plan.w_terms) - 1.0
         cosines = np.cos(np.arange(self.plan.w_terms) * np.arccos(x)[:, None])
         return np.asarray(np.einsum("wk,rcka->rcwa", cosines, terms))
 
     @cached_property
-    def _reflectance(self) -> Array:
+    def _w(self) -> Array:
+        """|w| at the nodes of every ring, (rings, w nodes)."""
+        w_max = np.sqrt(np.maximum(4.0 - self.plan.rings.rho() ** 2, 0.0))
+        return np.asarray(np.outer(w_max, w_nodes(self.plan.w_terms)))
+
+    @cached_property
+    def _reflectance(self) -> NDArray[np.float32]:
         """What of R stays inside the integral, (wavelengths of all rings, w nodes)."""
         reflectance = partial(brdf.spectral_reflectance, self.config.material, self.light)
-        return polar.at_nodes(reflectance, self.plan.rings.rho(), self.rules, self.plan.w_terms)
+        return spectral_integral.at_nodes(reflectance, self.plan.rings.rho(), self._w, self.rules)
 
     def rule_of_ring(self, ring: int) -> Quadrature:
         """Wavelengths and weights of one ring."""
@@ -121,9 +120,8 @@ class Setting:
         w is negative, and J_n(-z) = (-1)^n J_n(z).
         """
         n = np.arange(self.plan.terms)
-        w = w_nodes(self.plan.w_terms) * np.sqrt(max(4.0 - self.plan.rings.rho()[ring] ** 2, 0.0))
         rule = self.rule_of_ring(ring)
-        phase = 2.0 * pi / (1e-3 * rule.lambda_nm)[:, None] * w * self.field.half_range_um
+        phase = 2.0 * pi / (1e-3 * rule.lambda_nm)[:, None] * self._w[ring] * self.field.half_range_um
         amplitudes = np.where(n == 0, 1.0, 2.0) * (-1j) ** n * jv(n, phase[..., None])
         first = int(np.sum(self.rules.count[:ring]))
         return np.asarray(amplitudes * np.sqrt(self._reflectance[first : first + len(phase), :, None]))

@@ -179,7 +179,7 @@ class _Suite:
             samples=field.shape,
             sigma_um=main.sigma_um,
             map_size=effort.map_size,
-            terms=main.needed_terms,
+            terms=main.plan.terms,
             nodes=main.plan.s_nodes,
             w_terms=main.plan.w_terms,
             points=self._points,

@@ -24,23 +24,25 @@ def taps(built: Stack) -> int:
     return (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
 
 
-def stack(field: HeightField, built: Stack, terms: int) -> Work:
-    """Transforms of `terms` real fields, along x for every row, along y for the columns kept: 2.5 n log2 n real."""
+def stack(field: HeightField, built: Stack) -> Work:
+    """A transform of a real field for every term: along x for every row, along y for the columns kept."""
     ny, nx = field.shape
     columns = built.coefficients.shape[1] - built.column_zero
-    flops = terms * (2.5 * ny * nx * log2(nx) + 5.0 * columns * ny * log2(ny))
+    flops = built.terms * (2.5 * ny * nx * log2(nx) + 5.0 * columns * ny * log2(ny))
     precision: Precision = "single" if built.coefficients.itemsize == 4 else "double"
-    kept = built.coefficients.nbytes * terms / built.terms
-    return Work("stack", precision, flops, field.heights_um.nbytes + kept)
+    return Work("stack", precision, flops, field.heights_um.nbytes + _nbytes(built))
+
+
+def _nbytes(built: Stack) -> float:
+    """Bytes of the coefficients that are terms of the series."""
+    return float(built.coefficients.nbytes * built.terms / built.coefficients.shape[3])
 
 
 def spectrum(setting: Setting, built: Stack, made: PolarSpectrum) -> Work:
     """polar_spectrum: the window over every term, then the series at every node in s, for half of the azimuths."""
-    terms = setting.needed_terms
     pairs = _pairs_in_band(made)
-    flops = 2.0 * pairs * (taps(built) * 2 * terms + terms * 2 * setting.plan.s_nodes)
-    read = built.coefficients.nbytes * terms / built.terms
-    return Work("spectrum", "single", flops, read + made.values.nbytes)
+    flops = 2.0 * pairs * built.terms * 2 * (taps(built) + setting.plan.s_nodes)
+    return Work("spectrum", "single", flops, _nbytes(built) + made.values.nbytes)
 
 
 def _pairs_in_band(made: PolarSpectrum) -> int:
@@ -53,25 +55,33 @@ def _pairs_in_band(made: PolarSpectrum) -> int:
 def build_operator(setting: Setting) -> Work:
     """At every point: cardinal functions at the nodes of w, the radii about it; wavelengths over the points."""
     s, w = setting.plan.s_nodes, setting.plan.w_terms
-    points, between = _points(setting)
+    points, between, taken = _points(setting)
     wavelengths = float(np.sum(setting.rules.count))
     flops = 2.0 * (points * s * s * w + between * ORDER + wavelengths * ORDER * 3 * w)
-    return Work("build_operator", "single", flops, 4.0 * points * w * (s + 3))
+    return Work("build_operator", "single", flops, 4.0 * w * (points * s + 3 * taken))
 
 
 def apply_operator(setting: Setting, made: PolarSpectrum, table: PolarTable) -> Work:
-    """At every point: E over r where it lies between radii, then over s, into X, Y, Z; w's series at last."""
+    """At every point: E over r where it lies between radii, then over s; every ring's X, Y, Z; w's series at last."""
     s, w = setting.plan.s_nodes, setting.plan.w_terms
-    points, between = _points(setting)
-    each = between * ORDER * s + points * (s * w + 3 * w) + setting.plan.rings.count * 3 * w * w
-    moved = made.values.nbytes + 4.0 * points * w * (s + 3) + table.values.nbytes
+    points, between, taken = _points(setting)
+    each = between * ORDER * s + points * s * w + taken * 3 * w + setting.plan.rings.count * 3 * w * w
+    moved = made.values.nbytes + 4.0 * w * (points * s + 3 * taken) + table.values.nbytes
     return Work("apply_operator", "single", 2.0 * each * setting.plan.azimuths.count, moved)
 
 
-def _points(setting: Setting) -> tuple[float, float]:
-    """Points of all rings, and those of them that lie between radii."""
-    count = setting.points.count
-    return float(count.sum()), float(count[~setting.points.on_radii].sum())
+def _points(setting: Setting) -> tuple[float, float, float]:
+    """Points of all groups of rings, those of them between radii, and what all rings together take of them."""
+    points, rules = setting.points, setting.rules
+    ends = points.first + points.count
+    taken = 0
+    for ring, group in enumerate(points.group):
+        line = points.kappa_per_um[points.first[group] : ends[group]]
+        last = rules.first[ring] + rules.count[ring] - 1
+        low, high = points.stretch[ring] / rules.lambda_um[[last, rules.first[ring]]]
+        within = int(np.count_nonzero((line >= low) & (line <= high)))
+        taken += within if points.on_nodes[group] else min(within + ORDER, len(line))
+    return float(len(points.place)), float(points.count[~points.on_radii].sum()), float(taken)
 
 
 def splines(table: PolarTable) -> Work:

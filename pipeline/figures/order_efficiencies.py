@@ -130,7 +130,7 @@ def polar_power(field: HeightField, sigma_um: float, spacing: float) -> Callable
     z = series.largest_phase(field.half_range_um, LAMBDA_MIN_NM)
     terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-7, 1e-6))
     radius = spectrum.radii(sigma_um, 2e3 / LAMBDA_MIN_NM, spacing)
-    built = spectrum.chebyshev_stack(field, sigma_um, float(radius[-1]), 16 * -(-terms // 16), 1e-7)
+    built = spectrum.chebyshev_stack(field, sigma_um, float(radius[-1]), terms, 1e-7)
     # orders lie at azimuths 0 and pi, which are nodes of every grid
     table = spectral.build(spectrum.build(built, Azimuths(32), radius, LAMBDA_MIN_NM, nodes))
     return lambda uvw, nm: spectral.look_up(table, uvw, np.array([nm]))[:, 0]

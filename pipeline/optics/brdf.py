@@ -62,7 +62,7 @@ def integrand_of(config: Config) -> Callable[[float], Quadrature]:
 def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Array, cos_half: Array) -> Array:
     """What of R stays inside the spectral integral (..., L) at half angles (...,): a metal's; 1 of all else."""
     if material.fresnel != "conductor":
-        return np.ones((*np.shape(cos_half), len(lambda_nm)))
+        return np.broadcast_to(1.0, (*np.shape(cos_half), len(lambda_nm)))
     return _metal(material, trapezoid(spectrum, FINE_STEP_NM), lambda_nm, cos_half)
 
 

@@ -81,4 +81,4 @@ def load(artifact: Artifact) -> polar.PolarTable:
     return polar.PolarTable(arrays.load(zarr, "table"), grid)
 
 
-TABLE = Stage("table", 3, ("surface", "spectrum"), _parameters, _produce)
+TABLE = Stage("table", 4, ("surface", "spectrum"), _parameters, _produce)

@@ -116,4 +116,4 @@ def load(artifact: Artifact) -> spectrum.PolarSpectrum:
     )
 
 
-SPECTRUM = Stage("spectrum", 3, ("surface",), _parameters, _produce)
+SPECTRUM = Stage("spectrum", 4, ("surface",), _parameters, _produce)

@@ -91,7 +91,8 @@ def load(artifact: Artifact) -> dft_stack.Stack:
     found = arrays.attributes(zarr)
     for pair in ("spacing_per_um", "reach", "band_per_um"):
         found[pair] = tuple(found[pair])
-    return dft_stack.Stack(coefficients=arrays.load(zarr, "F"), **found)
+    coefficients = arrays.load(zarr, "F")
+    return dft_stack.Stack(coefficients=coefficients, terms=coefficients.shape[3], **found)
 
 
 STACK = Stage("stack", 2, ("surface",), _parameters, _produce)

@@ -10,7 +10,6 @@ from math import ceil
 
 import numpy as np
 
-from kernels.polar_spectrum import LANES
 from pipeline import series, spectrum
 from pipeline.config import LaserLine, PolarLayout, Scene, Spectrum
 from pipeline.optics.spectra import shortest_wavelength_nm
@@ -83,10 +82,8 @@ def make(
     lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
     z = series.largest_phase(max(field.half_range_um for field in fields), lambda_min)
     amplitude = AMPLITUDE_SHARE * budget.delta_e
-    wanted = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
-    # whole vectors of terms cost the same and are shared with the device without a copy
-    terms = LANES * ceil(wanted / LANES)
-    nodes = series.chebyshev_order(z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
+    terms = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
+    nodes = series.chebyshev_order(spectrum.S_REACH * z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
     light = _probing_light(light, layout)
     line = isinstance(light.illuminant, LaserLine)
     spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING

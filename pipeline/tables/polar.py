@@ -6,19 +6,19 @@ where `table` is looked up by bicubic B-splines. On the disc of a ring w reaches
 (u, v, w) is the sum of two unit vectors.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
-from kernels.spectral_operator import RingQuadratures, w_nodes
+from kernels.spectral_operator import RingQuadratures
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
 from pipeline.spectrum import PolarSpectrum
 from pipeline.tables import spectral_integral
 from pipeline.tables.polar_grid import PolarGrid, Rings
+from pipeline.tables.spectral_integral import Reflectance, grey
 
 # at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
 _LEAST_W2 = 1e-9
@@ -39,15 +39,6 @@ class PolarTable:
         return int(self.values.shape[2])
 
 
-# R (..., L) inside the spectral integral from wavelengths in nm (L,) and cosines of half angles (...,)
-Reflectance = Callable[[Array, Array], Array]
-
-
-def grey(lambda_nm: Array, cos_half: Array) -> Array:
-    """Nothing of R varies with wavelength, so all of it stays outside the integral."""
-    return np.ones((*cos_half.shape, len(lambda_nm)))
-
-
 def build(
     spectrum: PolarSpectrum,
     rings: Rings,
@@ -57,23 +48,10 @@ def build(
 ) -> PolarTable:
     """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
     rho = rings.rho()
-    reflected = at_nodes(reflectance, rho, quadratures, w_terms)
-    samples = spectral_integral.integrate(
-        spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um, rho, quadratures, reflected
-    )
+    of = spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um
+    samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
     values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
     return PolarTable(values, PolarGrid(rings, spectrum.azimuths))
-
-
-def at_nodes(reflectance: Reflectance, rho: Array, quadratures: RingQuadratures, w_terms: int) -> Array:
-    """R (nodes of all rings' rules, w terms). (u, v, w) = -wi - wr, so cos(half angle) = sqrt(rho^2 + w^2) / 2."""
-    shares = w_nodes(w_terms)
-    found = []
-    for ring, first, count in zip(rho, quadratures.first, quadratures.count, strict=True):
-        w = shares * np.sqrt(max(4.0 - ring**2, 0.0))
-        lambda_nm = 1e3 * quadratures.lambda_um[first : first + count]
-        found.append(reflectance(lambda_nm, 0.5 * np.hypot(ring, w)).T)
-    return np.concatenate(found)
 
 
 def w_position(rho: Array, w: Array) -> Array:

@@ -56,9 +56,8 @@ def _exact(of: Ingredients, half_turn: Array, rho: Array, w: Array) -> Array:
     """XYZ / (C cos ti) (rhos, angles, 3) on rings `rho` at both half turns' angles, for `w` (rhos, angles)."""
     found = spectrum.gather(of.stack, half_turn, of.radius_per_um, of.lambda_min_nm, of.s_nodes)
     rules = of.rules(rho)
-    reflected = polar.at_nodes(polar.grey, rho, rules, of.w_terms + _SPARE_W_TERMS)
-    s_max = spectrum.s_max(of.lambda_min_nm)
-    terms = spectral_integral.integrate(found, of.radius_per_um, s_max, rho, rules, reflected)
+    s_max, w_terms = spectrum.s_max(of.lambda_min_nm), of.w_terms + _SPARE_W_TERMS
+    terms = spectral_integral.integrate(found, of.radius_per_um, s_max, rho, rules, w_terms)
     x = polar.w_position(rho[:, None], w)
     cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
     return np.asarray(np.einsum("rcka,rak->rac", terms, cosines))

@@ -7,8 +7,10 @@ mean square of D's error over the window. Large rings need fine steps, rings nea
 """
 
 from collections.abc import Callable
+from math import ceil, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.spectral_operator import RingQuadratures as RingQuadratures
 from pipeline.config import FINE_STEP_NM
@@ -40,14 +42,15 @@ def choose(
     share = np.exp(-0.5 * (x / sigma_um) ** 2)
     share /= share.sum()
     y = np.linspace(0.0, x[-1] * rho[-1], _points(x[-1] * rho[-1], coarse))
-    chosen, rules = np.full(len(rho), -1), [coarse]
+    chosen, open_, rules = np.full(len(rho), -1), np.arange(len(rho)), [coarse]
     response = _response(coarse, y)
     for finer in steps:
         response_finer = _response(finer, y)
         error = np.max(np.abs(response - response_finer) ** 2, axis=1)
-        left = np.sqrt(np.interp(np.outer(rho, x), y, error) @ share)
-        chosen[(chosen < 0) & (left <= tolerance)] = len(rules) - 1
-        if np.all(chosen >= 0):
+        left = np.sqrt(np.interp(np.outer(rho[open_], x), y, error) @ share)
+        chosen[open_[left <= tolerance]] = len(rules) - 1
+        open_ = open_[left > tolerance]
+        if not len(open_):
             return _assemble(rules, chosen)
         rules.append(finer)
         response = response_finer
@@ -77,15 +80,29 @@ def _points(y_max: float, rule: Quadrature) -> int:
 
 
 def _response(rule: Quadrature, y: Array) -> Array:
-    """D(y) of X, Y, Z (len(y), 3), over each channel's integral."""
+    """D(y) of X, Y, Z (len(y), 3), over each channel's integral; `y` in even steps from 0.
+
+    A wave at a sum is the product of waves at its parts, which makes the sum over wavelengths a matrix product.
+    """
+    # three channels multiply the waves within a run
+    run = ceil(sqrt(len(y) / 3.0))
+    starts, within = _waves(rule, y[::run]), _waves(rule, y[:run])
+    # a channel that sees nothing has no error either
+    total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
+    shared = within[:, None] * (rule.weights / total).T.astype(np.float32)
+    found = starts @ shared.reshape(3 * run, -1).T
+    return np.asarray(found.reshape(-1, 3)[: len(y)])
+
+
+def _waves(rule: Quadrature, y: Array) -> NDArray[np.complex64]:
+    """exp(2 pi i y / lambda), (len(y), L)."""
     turns = np.outer(y, 1e3 / rule.lambda_nm)
     # whole turns go first: what is left keeps its digits in single precision, whose sine and cosine are much faster
     turns -= np.rint(turns)
     phase = (2.0 * np.pi * turns).astype(np.float32)
-    # a channel that sees nothing has no error either
-    total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
-    shares = (rule.weights / total).astype(np.float32)
-    return np.asarray(np.cos(phase) @ shares + 1j * (np.sin(phase) @ shares))
+    waves = np.empty(phase.shape, np.complex64)
+    waves.real, waves.imag = np.cos(phase), np.sin(phase)
+    return waves
 
 
 def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:

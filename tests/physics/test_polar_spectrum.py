@@ -12,7 +12,7 @@ from pipeline.optics import brdf
 from pipeline.optics.spectra import Quadrature, trapezoid
 from pipeline.reference import Reference, power_direct
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import polar, quadrature, spectral, spectral_integral
+from pipeline.tables import line_points, polar, quadrature, spectral, spectral_integral
 from pipeline.tables.polar_grid import Azimuths, Rings
 
 SIGMA = 2.0
@@ -30,12 +30,8 @@ def spectrum_of(
     z = series.largest_phase(field.half_range_um, lambda_min_nm)
     terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
     radius = spectrum.radii(SIGMA, 2e3 / lambda_min_nm, spacing)
-    built = spectrum.chebyshev_stack(field, SIGMA, radius[-1], 16 * -(-terms // 16), 1e-6)
+    built = spectrum.chebyshev_stack(field, SIGMA, radius[-1], terms, 1e-6)
     return spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
-
-
-def ones(rule, rings: int, w_terms: int) -> np.ndarray:
-    return np.ones((rings * len(rule.lambda_nm), w_terms))
 
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.6])
@@ -72,8 +68,8 @@ def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
     np.testing.assert_allclose(thinned.values, coarse.values, rtol=1e-4, atol=1e-7)
 
 
-# the origin, where radii are mirrored, and out to the rim
-RHO = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.9, 2.0])
+# the origin, where radii are mirrored, and out to the rim; rings alone and rings that share points
+RHO = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.13, 1.16, 1.9, 1.95, 2.0])
 
 
 def integral_error(field: HeightField, power: spectrum.PolarSpectrum, rule: Quadrature, w_terms: int) -> float:
@@ -84,7 +80,7 @@ def integral_error(field: HeightField, power: spectrum.PolarSpectrum, rule: Quad
         power.s_max_per_um,
         RHO,
         quadrature.uniform(rule, len(RHO)),
-        ones(rule, len(RHO), w_terms),
+        w_terms,
     )
     assert terms.shape == (len(RHO), 3, w_terms, 32)
     reference = Reference(field, SIGMA, rule.lambda_min_nm)
@@ -124,32 +120,57 @@ def test_few_wavelengths_are_their_own_points(step_nm: float) -> None:
     rule = trapezoid(light, step_nm)
     rules = quadrature.uniform(rule, len(RHO))
     nodes = power.values.shape[2]
-    points = spectral_integral.line_points(power.radius_per_um, nodes, power.s_max_per_um, RHO, rules)
+    points = line_points.choose(power.radius_per_um, nodes, power.s_max_per_um, RHO, rules)
     assert points.on_nodes.all()
     np.testing.assert_allclose(1e3 / points.kappa_per_um[: points.count[0]], rule.lambda_nm[::-1])
     assert integral_error(field, power, rule, 8) < 4e-3
 
 
-@pytest.mark.parametrize("height", [0.05, 0.6])
-def test_points_on_radii_and_between_them_give_one_integral(height: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("height", "w_terms"), [(0.05, 8), (0.6, 36)])
+def test_points_on_radii_and_between_them_give_one_integral(
+    height: float, w_terms: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every ring that is allowed on radii, forced between them, where interpolation over r is the old one."""
     power = spectrum_of(rough(height=height), Azimuths(32, 0.8, 0.2))
     rho = np.linspace(0.0, 2.0, 41)
     rules = quadrature.uniform(trapezoid(LIGHT, 5.0), len(rho))
     of = power.radius_per_um, power.s_max_per_um, rho, rules
     shape = power.values.shape[2]
-    points = spectral_integral.line_points(of[0], shape, *of[1:])
+    points = line_points.choose(of[0], shape, *of[1:])
     assert points.on_radii[-3:].all()
     assert not points.on_radii[:2].any()
     assert np.all(points.count >= 8)
-    mixed = spectral_integral.integrate(power.values, *of, np.ones((41 * 81, 8)))
-    monkeypatch.setattr(spectral_integral, "_STEP_ON_RADII", 0.0)
-    monkeypatch.setattr(spectral_integral, "_STEP_IN_RADII", 0.1)
-    assert not spectral_integral.line_points(of[0], shape, *of[1:]).on_radii[:-1].any()
-    between = spectral_integral.integrate(power.values, *of, np.ones((41 * 81, 8)))
+    mixed = spectral_integral.integrate(power.values, *of, w_terms)
+    monkeypatch.setattr(line_points, "_STEP_ON_RADII", 0.0)
+    monkeypatch.setattr(line_points, "_STEP_IN_RADII", 0.1)
+    assert not line_points.choose(of[0], shape, *of[1:]).on_radii[:-1].any()
+    between = spectral_integral.integrate(power.values, *of, w_terms)
     level = np.sqrt(np.mean(between.astype(np.float64) ** 2, axis=(2, 3), keepdims=True))
     np.testing.assert_array_less(np.abs(mixed - between) / level, 2e-2)
     assert np.sqrt(np.mean(((mixed - between) / level) ** 2)) < 2e-3
+
+
+@pytest.mark.parametrize("metal", [False, True])
+def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    power, rings = spectrum_of(rough(), Azimuths(32, 0.8, 0.2)), Rings(140, 0.12)
+    material = Material(fresnel="conductor") if metal else Material()
+    rules = quadrature.uniform(trapezoid(LIGHT, 5.0), rings.count)
+    of = power.radius_per_um, power.s_max_per_um, rings.rho(), rules
+    nodes, reflectance = power.values.shape[2], partial(brdf.spectral_reflectance, material, LIGHT)
+    points = line_points.choose(of[0], nodes, *of[1:])
+    assert points.rings.sum() == rings.count
+    assert points.rings.max() == 8
+    assert len(points.rings) < 60
+    np.testing.assert_array_less(
+        points.kappa_per_um * of[2][points.first_ring].repeat(points.count), of[0][-1] + 1e-9
+    )
+    together = spectral_integral.integrate(power.values, *of, 12, reflectance)
+    monkeypatch.setattr(line_points, "MOST_RINGS", 1)
+    assert len(line_points.choose(of[0], nodes, *of[1:]).rings) == rings.count
+    alone = spectral_integral.integrate(power.values, *of, 12, reflectance)
+    level = np.sqrt(np.mean(alone.astype(np.float64) ** 2, axis=(2, 3), keepdims=True))
+    np.testing.assert_array_less(np.abs(together - alone) / level, 2e-2)
+    assert np.sqrt(np.mean(((together - alone) / level) ** 2)) < 1e-3
 
 
 def test_wavelengths_follow_the_radius() -> None:
