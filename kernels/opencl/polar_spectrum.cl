@@ -112,12 +112,15 @@ typedef struct {
     int16 row, column, turned, known;
 } Window;
 
+/* rint below 2^51, which PoCL works out in twenty operations: 1.5 * 2^52 leaves no digits for what follows the point */
+static double16 nearest(const double16 x) { return (x + 6755399441055744.0) - 6755399441055744.0; }
+
 static void place_window(const Grid grid, __global const float *decay, double16 fx, double16 fy, const double fx_max,
                          const double fy_max, Window *window) {
     const double16 turn = select((double16)1.0, (double16)-1.0, fx < 0.0);
     fx *= turn;
     fy *= turn;
-    const double16 x = rint(fx * (1.0 / grid.dfx)), y = rint(fy * (1.0 / grid.dfy));
+    const double16 x = nearest(fx * (1.0 / grid.dfx)), y = nearest(fy * (1.0 / grid.dfy));
     window_weights(convert_float16(fx - x * grid.dfx), grid.dfx, grid.inverse_2_variance, decay, REACH_X, window->along_x);
     window_weights(convert_float16(fy - y * grid.dfy), grid.dfy, grid.inverse_2_variance, decay + TAPS_X, REACH_Y, window->along_y);
     window->row = convert_int16(y) - REACH_Y + grid.row_zero;
