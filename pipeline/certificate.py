@@ -16,9 +16,8 @@ from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError
 from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
 from pipeline.progress import Progress, silent
-from pipeline.reference import reference_of
+from pipeline.reference import MeanReference
 from pipeline.spectrum import PolarSpectrum
-from pipeline.surface.heightfield import HeightField
 from pipeline.tables import plan, spectral
 from pipeline.validation import (
     MIRROR_FLOOR,
@@ -47,12 +46,13 @@ class Certificate:
     reference: RelativeError
 
 
-def certify(evaluate: Evaluator, field: HeightField, config: Config, progress: Progress = silent) -> Certificate:
-    """The certificate of a table (`evaluate`) of a height field.
+def certify(
+    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+) -> Certificate:
+    """The certificate of a table (`evaluate`), beside the reference of its height field.
 
     Raises AccuracyError where it misses its budget, or where the reference's two routes part.
     """
-    reference = reference_of(field, config)
     checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(evaluate, reference, config, progress)
     exposure = config.accuracy.exposure_ru
@@ -61,15 +61,16 @@ def certify(evaluate: Evaluator, field: HeightField, config: Config, progress: P
     if measured > budget:
         raise AccuracyError(
             f"the table misses its budget: on {random.directions} random directions its mean CIELAB error at "
-            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. {_way_out(field, config)}"
+            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. "
+            f"{_way_out(reference, config)}"
         )
     return Certificate(budget, exposure, measured, random, checked)
 
 
-def _way_out(field: HeightField, config: Config) -> str:
+def _way_out(reference: MeanReference, config: Config) -> str:
     """What to do about a missed budget: grids follow anything but the sharp edge of what a coarse scan knows."""
     text = 'Raise it, or leave table.rings, azimuths, terms and w_terms on "auto".'
-    band = min(field.band_limit_per_um)
+    band = min(reference.fields[0].band_limit_per_um)
     if band >= plan.rho_max(config.scene) / (1e-3 * shortest_wavelength_nm(config.spectrum)):
         return text
     return (
@@ -78,14 +79,14 @@ def _way_out(field: HeightField, config: Config) -> str:
     )
 
 
-def certify_spectral(power: PolarSpectrum, config: Config, field: HeightField) -> RelativeError | None:
+def certify_spectral(power: PolarSpectrum, reference: MeanReference, config: Config) -> RelativeError | None:
     """Errors of I_lambda on random directions, where a config asks for the spectral form: else nothing to say."""
     if not isinstance(config.table, PolarLayout) or config.table.form != "spectral":
         return None
     wi, wr = random_pairs(config.scene, _SPECTRAL_DIRECTIONS, _SEED)
     uvw = geometry.uvw(wi, wr)
     wavelengths = trapezoid(config.spectrum, _SPECTRAL_STEP_NM).lambda_nm
-    exact = np.nan_to_num(reference_of(field, config).power(uvw, wavelengths))
+    exact = np.nan_to_num(reference.power(uvw, wavelengths))
     return relative_error(spectral.look_up(spectral.build(power), uvw, wavelengths), exact, MIRROR_FLOOR)
 
 

@@ -195,6 +195,40 @@ static void add_shares(const float16 (*line)[W_TERMS][2], const int points, cons
     UNROLL for (int q = 0; q < 24; ++q) sum[q / 8][m + q / 2 % 4][q % 2] = part[q / 8][q / 2 % 4][q % 2];
 }
 
+/* G of some points of a group at every node of w, for both tiles */
+static void take_line(const Group group, const int from, const int to, __global const float *here,
+                      __global const float *opposite, __global const int *place, __global const float *along_r,
+                      __global const float *along_s, float16 (*line)[W_TERMS][2]) {
+    for (int p = group.first + from; p < group.first + to; ++p, ++line) {
+        __global const float *weights = along_s + (long)p * S_NODES * W_TERMS;
+        if (group.on_radii) {
+            const long row = (long)place[p] * S_NODES * 16;
+            for (int m = 0; m < W_TERMS; m += W_BLOCK)
+                along_line_on_radius(here + row, opposite + row, weights + m, *line + m);
+        } else {
+            float e_here[16 * S_NODES], e_opposite[16 * S_NODES];
+            between_radii(here, opposite, place[p], along_r + p * ORDER, e_here, e_opposite);
+            for (int m = 0; m < W_TERMS; m += W_BLOCK)
+                along_line_between_radii(e_here, e_opposite, weights + m, *line + m);
+        }
+    }
+}
+
+/* A ring's Chebyshev terms over its own w, from values at its group's nodes */
+static void write_terms(const float16 (*sum)[W_TERMS][2], __global const float *w_series, const int tile, const int tiles,
+                        __global float *ring) {
+    for (int o = 0; o < 3 * W_TERMS; ++o) {
+        __global const float *series = w_series + o % W_TERMS * W_TERMS;
+        float16 a = 0.0f, b = 0.0f;
+        for (int m = 0; m < W_TERMS; ++m) {
+            a = fma((float16)series[m], sum[o / W_TERMS][m][0], a);
+            b = fma((float16)series[m], sum[o / W_TERMS][m][1], b);
+        }
+        vstore16(a, 2 * tiles * o + tile, ring);
+        vstore16(b, 2 * tiles * o + tile + tiles, ring);
+    }
+}
+
 /* The table of one group of rings, at the sixteen azimuths of a tile and those half a turn on. One work-item, one group
  * and one tile of half a turn.
  *
@@ -213,25 +247,11 @@ __kernel void apply_operator(__global const float *spectrum, const int radii, __
     __global const float *opposite = here + (long)tiles * radii * S_NODES * 16;
 
     float16 sum[MOST_RINGS][3][W_TERMS][2];
-    for (int i = 0; i < group.rings; ++i)
-        for (int q = 0; q < 6 * W_TERMS; ++q) sum[i][q / (2 * W_TERMS)][q / 2 % W_TERMS][q % 2] = 0.0f;
+    for (int q = 0; q < group.rings * 6 * W_TERMS; ++q) ((float16 *)sum)[q] = 0.0f;
     for (int from = 0; from < group.points; from += CHUNK) {
         const int to = min(from + CHUNK, group.points);
         float16 line[CHUNK][W_TERMS][2];
-        for (int p = from; p < to; ++p) {
-            __global const float *weights = along_s + (long)(group.first + p) * S_NODES * W_TERMS;
-            const int at = place[group.first + p];
-            if (group.on_radii) {
-                const long row = (long)at * S_NODES * 16;
-                for (int m = 0; m < W_TERMS; m += W_BLOCK)
-                    along_line_on_radius(here + row, opposite + row, weights + m, line[p - from] + m);
-            } else {
-                float e_here[16 * S_NODES], e_opposite[16 * S_NODES];
-                between_radii(here, opposite, at, along_r + (group.first + p) * ORDER, e_here, e_opposite);
-                for (int m = 0; m < W_TERMS; m += W_BLOCK)
-                    along_line_between_radii(e_here, e_opposite, weights + m, line[p - from] + m);
-            }
-        }
+        take_line(group, from, to, here, opposite, place, along_r, along_s, line);
         for (int i = 0; i < group.rings; ++i) {
             const int2 taken = span[group.ring + i];
             const int first = max(from, taken.x), points = min(to, taken.y) - first;
@@ -240,17 +260,8 @@ __kernel void apply_operator(__global const float *spectrum, const int radii, __
                 for (int m = 0; m < W_TERMS; m += 4) add_shares(line + first - from, points, m, own, sum[i]);
         }
     }
-    for (int i = 0; i < group.rings; ++i)
-        for (int c = 0; c < 3; ++c)
-            for (int k = 0; k < W_TERMS; ++k) {
-                __global const float *series = w_series + ((group.ring + i) * W_TERMS + k) * W_TERMS;
-                float16 a = 0.0f, b = 0.0f;
-                for (int m = 0; m < W_TERMS; ++m) {
-                    a = fma((float16)series[m], sum[i][c][m][0], a);
-                    b = fma((float16)series[m], sum[i][c][m][1], b);
-                }
-                __global float *row = table + (((long)(group.ring + i) * 3 + c) * W_TERMS + k) * 32 * tiles;
-                vstore16(a, tile, row);
-                vstore16(b, tile + tiles, row);
-            }
+    for (int i = 0; i < group.rings; ++i) {
+        const long ring = group.ring + i;
+        write_terms(sum[i], w_series + ring * W_TERMS * W_TERMS, tile, tiles, table + ring * 96 * W_TERMS * tiles);
+    }
 }

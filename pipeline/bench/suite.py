@@ -38,12 +38,16 @@ _GRATING_STRETCH = 0.5
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: grids as (resolution, step in nm) and layouts, textures, samples, repeats."""
+    """How much is measured: grids as (resolution, step in nm) and layouts, textures, samples, repeats.
+
+    bakes: of the layout MAIN, some hundredths of a second each; what else the machine does comes in bursts of many.
+    """
 
     map_size: int
     paper: tuple[tuple[int, float], ...]
     polar: tuple[PolarLayout, ...]
     textures: tuple[int, ...]
+    bakes: int
     repeats: int
     numpy_nodes: int
     nufft_azimuths: int
@@ -64,6 +68,7 @@ FULL = Effort(
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((200, 2560), (280, 3584))),
     ),
     textures=(2, 3, 4, 6),
+    bakes=25,
     repeats=5,
     numpy_nodes=8,
     nufft_azimuths=32,
@@ -76,6 +81,7 @@ QUICK = replace(
     paper=((201, STEP_NM), (201, 20.0)),
     polar=(MAIN,),
     textures=(3,),
+    bakes=5,
     repeats=2,
     numpy_nodes=2,
     nufft_azimuths=16,
@@ -166,7 +172,7 @@ class _Suite:
         effort, config, field = self._effort, self._config, self._field
         self._truth = MapTruth(field, config, effort.map_size, self._progress)
         main = setting.make(field, config, MAIN)
-        baked = polar_bake.bake(main, effort.repeats)
+        baked = polar_bake.bake(main, effort.bakes)
         self._stages += polar_bake.stages(main, baked)
         samples = main.samples(baked.made)
         numpy_pair_s, numpy_agrees = self._numpy(main, baked, samples)

@@ -13,6 +13,7 @@ from pipeline.device_stack import kernel_digest
 from pipeline.evaluate import table_evaluator
 from pipeline.optics import brdf
 from pipeline.progress import Progress
+from pipeline.reference import reference_of
 from pipeline.stages import spectrum, surface
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
 from pipeline.store import Artifact
@@ -43,8 +44,9 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     progress("table", 1.0)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
     field = surface.load(inputs["surface"])
-    certified = certificate.certify(table_evaluator(table, config), field, config, progress)
-    spectral = certificate.certify_spectral(power, config, field)
+    reference = reference_of(field, config)
+    certified = certificate.certify(table_evaluator(table, config), reference, config, progress)
+    spectral = certificate.certify_spectral(power, reference, config)
     arrays.save(
         folder / _FILE,
         {
