@@ -16,6 +16,7 @@ from cli import console, sources
 # what comes with the tool, where no config is named: each recipe with its defaults
 _BUILT_IN = ("elaphe", "xenopeltis", "blazed")
 _PROCESS = "from cli.main import process; process()"
+_WHOLE_RUNS = 6
 
 
 @click.command("bench")
@@ -96,10 +97,10 @@ def _surface(config: Any, path: Path, store: Any, quick: bool) -> tuple[Any, flo
 def _whole_run(path: Path, progress: Any) -> float | None:
     """Seconds of a fresh `run --until table` with an empty store and warm kernels; None where it fails.
 
-    The first of three fills the kernel cache; the faster of the others counts.
+    The first fills the kernel cache; the fastest of the others counts.
     """
     seconds = []
-    for i in range(3):
+    for i in range(_WHOLE_RUNS):
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-c", _PROCESS, "run", str(path), "--until", "table"]
             started = time.perf_counter()
@@ -113,7 +114,7 @@ def _whole_run(path: Path, progress: Any) -> float | None:
         if done.returncode != 0:
             console.warn(f"{path}: run --until table failed: {done.stderr.strip().splitlines()[-1]}")
             return None
-        progress("whole runs", (i + 1) / 3)
+        progress("whole runs", (i + 1) / _WHOLE_RUNS)
     return min(seconds[1:])
 
 

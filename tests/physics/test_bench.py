@@ -1,5 +1,7 @@
 """The bench's other ways to the same numbers, its counts of work, and its verdicts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from kernels import device
 from pipeline.bench import machine, memory, nufft, plain, polar_bake, setting, work
 from pipeline.bench.criteria import Criterion
 from pipeline.bench.machine import Machine, Timed, Work
+from pipeline.bench.polar_bake import Stages
 from pipeline.bench.setting import Setting
 from pipeline.bench.truth import MapTruth
 from pipeline.config import Coherence, Config, Material, Mirror, PolarLayout, Spectrum, Surface
@@ -66,6 +69,17 @@ def test_nufft_gives_the_samples(case: Setting) -> None:
     assert error.percentile_99 < 0.05
     assert nufft.points_of(case) == routed.points
     assert routed.seconds(case) > routed.fixed_s > 0.0
+
+
+def test_of_two_bakes_the_better_times_count() -> None:
+    of = CASES["plain"]
+    baked = polar_bake.bake(setting.make(*of, PolarLayout(rings=24, azimuths=96)), 1)
+    slow = replace(baked, stages=Stages(1.0, 1.0, 1.0), second_light_s=9.0, kernel_s={"a": 1.0, "b": 4.0})
+    fast = replace(baked, stages=Stages(0.1, 2.0, 0.1), second_light_s=None, kernel_s={"a": 3.0, "b": 2.0})
+    for found in (polar_bake.best(slow, fast), polar_bake.best(fast, slow)):
+        assert found.stages.total == pytest.approx(2.2)
+        assert found.second_light_s == 9.0
+        assert found.kernel_s == {"a": 1.0, "b": 2.0}
 
 
 def test_a_bake_is_timed_kernel_by_kernel() -> None:
