@@ -210,18 +210,23 @@ def _spectrum(field: HeightField, highest_per_um: float) -> _Spectrum:
     """
     ny, nx = field.shape
     window = _window(ny)[:, None] * _window(nx)
-    heights = field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))
-    power = np.abs(fft.fftshift(fft.fft2(heights * window, workers=-1))) ** 2
-    power /= power.size * float(np.sum(window**2))
-    # rounding of a flat field is no structure
-    peak = float(np.max(np.abs(field.heights_um)))
-    variance = float(np.sum(power))
+    seen = (field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))) * window
+    weight = float(np.sum(window**2))
+    # Parseval's sum over all frequencies; rounding of a flat field is no structure
+    peak, variance = float(np.max(np.abs(field.heights_um))), float(np.vdot(seen, seen)) / weight
     variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
-    fx = fft.fftshift(fft.fftfreq(nx, field.pitch_um[0]))
-    fy = fft.fftshift(fft.fftfreq(ny, field.pitch_um[1]))
-    in_x, in_y = np.abs(fx) <= highest_per_um, np.abs(fy) <= highest_per_um
+    x, fx = _ascending(nx, field.pitch_um[0], highest_per_um)
+    y, fy = _ascending(ny, field.pitch_um[1], highest_per_um)
+    power = np.abs(fft.fft2(seen, workers=-1)[np.ix_(y, x)]) ** 2 / (seen.size * weight)
     size_x, size_y = field.size_um
-    return _Spectrum(power[np.ix_(in_y, in_x)], fx[in_x], fy[in_y], (1 / size_x, 1 / size_y), variance)
+    return _Spectrum(power, fx, fy, (1 / size_x, 1 / size_y), variance)
+
+
+def _ascending(samples: int, pitch_um: float, highest_per_um: float) -> tuple[np.ndarray, Array]:
+    """Places in a transform, and their frequencies, up to the highest on either side of 0."""
+    place, frequency = fft.fftshift(np.arange(samples)), fft.fftshift(fft.fftfreq(samples, pitch_um))
+    kept = np.abs(frequency) <= highest_per_um
+    return place[kept], frequency[kept]
 
 
 def _window(samples: int) -> Array:
