@@ -40,7 +40,7 @@ def bench_command(
     in plain numpy, each with its mean CIELAB error at 7500 RU; and the stages' shares of the device's peak and
     bandwidth, which are measured in the same run. Without CONFIGs: three synthetic surfaces.
     """
-    from pipeline.bench import criteria, files, machine
+    from pipeline.bench import criteria, files, machine, tall
     from pipeline.store import writing
 
     store = console.open_store(store_root)
@@ -57,7 +57,8 @@ def bench_command(
             found.append(_surface(config, path, store, quick))
             measured = machine.best(measured, machine.measure())
     judged = [c for bench, whole_run_s in found for c in criteria.of_surface(bench, measured, whole_run_s)]
-    results = files.Results(measured, [bench for bench, _ in found], [*judged, _large_scan(quick)])
+    judged += [*criteria.of_tall_surfaces(tall.chebyshev_error(), tall.taylor_error()), _large_scan(quick)]
+    results = files.Results(measured, [bench for bench, _ in found], judged)
     written = _write(results, out)
     if as_json:
         console.print_json({**files.document(results), "files": [str(path) for path in written]})

@@ -7,12 +7,15 @@ from typing import Literal
 from pipeline.bench.machine import Machine, share
 from pipeline.bench.paper import RESOLUTION, STEP_NM
 from pipeline.bench.suite import MAIN, NUFFT, NUMPY_POLAR, PAPER, POLAR, TEXTURES, SurfaceBench, settings_of
+from pipeline.bench.tall import HEIGHT_UM, TAYLOR_HEIGHT_UM
 
 _GIB = 2.0**30
 # mean error by number of textures
 _TEXTURE_LIMITS = {3: 0.2, 2: 0.9}
 # beside the paper's 501 x 501
 _TEXELS = 252_000
+# white noise, held to this relative error
+_TALL, _DIGITS = "tall noise", 1e-4
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,17 @@ def of_surface(bench: SurfaceBench, machine: Machine, whole_run_s: float | None)
 def of_large_scan(peak_bytes: int | None) -> Criterion:
     measured = None if peak_bytes is None else peak_bytes / _GIB
     return Criterion("4096^2", "4", "peak memory at 64 terms", measured, "<", 3.0, "GiB")
+
+
+def of_tall_surfaces(chebyshev: float | None, taylor: float | None) -> list[Criterion]:
+    """What errors at 10 um and 2 um of height say of the two series."""
+    what = "{} at {:g} um, worst error"
+    return [
+        Criterion(_TALL, "5", what.format("E in float32", HEIGHT_UM), chebyshev, "<=", _DIGITS, ""),
+        Criterion(
+            _TALL, "5", what.format("Taylor in float64", TAYLOR_HEIGHT_UM), taylor, ">=", _DIGITS, "", "failed"
+        ),
+    ]
 
 
 def _errors(bench: SurfaceBench) -> Iterable[Criterion]:
