@@ -40,8 +40,9 @@ def bench_command(
     in plain numpy, each with its mean CIELAB error at 7500 RU; and the stages' shares of the device's peak and
     bandwidth, which are measured in the same run. Without CONFIGs: three synthetic surfaces.
     """
-    from pipeline.bench import criteria, files, machine, tall
+    from pipeline.bench import criteria, files, machine
     from pipeline.store import writing
+    from pipeline.stress import judging, sweep
 
     store = console.open_store(store_root)
     with _paths(config_paths) as paths:
@@ -57,7 +58,7 @@ def bench_command(
             found.append(_surface(config, path, store, quick))
             measured = machine.best(measured, machine.measure())
     judged = [c for bench, whole_run_s in found for c in criteria.of_surface(bench, measured, whole_run_s)]
-    judged += [*criteria.of_tall_surfaces(tall.chebyshev_error(), tall.taylor_error()), _large_scan(quick)]
+    judged += [*criteria.of_series(judging.criterion(judging.sweep(sweep.tall()))), _large_scan(quick)]
     results = files.Results(measured, [bench for bench, _ in found], judged)
     written = _write(results, out)
     if as_json:

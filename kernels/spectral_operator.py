@@ -25,6 +25,11 @@ class RingQuadratures:
     first: np.ndarray
     count: np.ndarray
 
+    @property
+    def kappa_ends_per_um(self) -> tuple[np.ndarray, np.ndarray]:
+        """1 / lambda of every ring's longest wavelength, and of its shortest."""
+        return 1.0 / self.lambda_um[self.first + self.count - 1], 1.0 / self.lambda_um[self.first]
+
 
 @dataclass(frozen=True)
 class LinePoints:
@@ -55,6 +60,10 @@ class LinePoints:
     def first_ring(self) -> np.ndarray:
         """The first ring of every group, (groups,)."""
         return np.asarray(np.cumsum(self.rings) - self.rings)
+
+    def reach(self, rho: np.ndarray) -> np.ndarray:
+        """|w| of every ring where its group's line ends, (rings,): at the first ring's w_max."""
+        return np.asarray(self.stretch * w_max(rho)[self.first_ring][self.group])
 
 
 def integrate(
@@ -139,9 +148,9 @@ def _rings(points: LinePoints, quadratures: RingQuadratures) -> np.ndarray:
 def _to_w_terms(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
     """Chebyshev coefficients over every ring's w from values at its group's nodes, (rings, w_terms, w_terms)."""
     to_terms, x = chebyshev(w_terms)
-    w_max, reach = _w_max(rho), points.stretch * _w_max(rho)[points.first_ring][points.group]
+    reach = points.reach(rho)
     # at the rim all nodes are one
-    share = np.divide(w_max, reach, out=np.ones_like(rho), where=reach > 0.0)
+    share = np.divide(w_max(rho), reach, out=np.ones_like(rho), where=reach > 0.0)
     own = share[:, None] * (x + 1.0) - 1.0
     through = np.cos(np.arange(w_terms) * np.arccos(np.minimum(own, 1.0))[..., None]) @ to_terms
     return np.asarray(to_terms @ through)
@@ -149,11 +158,10 @@ def _to_w_terms(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray
 
 def group_w(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
     """|w| of every ring where its group takes E, (rings, w_terms); beyond a ring's own w_max it goes on."""
-    first = points.first_ring[points.group]
-    return np.outer(points.stretch * _w_max(rho)[first], w_nodes(w_terms))
+    return np.outer(points.reach(rho), w_nodes(w_terms))
 
 
-def _w_max(rho: np.ndarray) -> np.ndarray:
+def w_max(rho: np.ndarray) -> np.ndarray:
     """The largest |w| of every ring."""
     return np.sqrt(np.maximum(4.0 - rho**2, 0.0))
 

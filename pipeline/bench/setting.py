@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from kernels.spectral_operator import LinePoints, RingQuadratures, w_nodes
+from kernels.spectral_operator import LinePoints, RingQuadratures, w_max, w_nodes
 from pipeline import spectrum
 from pipeline.config import Config, LaserLine, PolarLayout, Spectrum
 from pipeline.optics import brdf
@@ -99,8 +99,7 @@ class Setting:
     @cached_property
     def _w(self) -> Array:
         """|w| at the nodes of every ring, (rings, w nodes)."""
-        w_max = np.sqrt(np.maximum(4.0 - self.plan.rings.rho() ** 2, 0.0))
-        return np.asarray(np.outer(w_max, w_nodes(self.plan.w_terms)))
+        return np.outer(w_max(self.plan.rings.rho()), w_nodes(self.plan.w_terms))
 
     @cached_property
     def _reflectance(self) -> NDArray[np.float32]:

@@ -72,14 +72,12 @@ def apply_operator(setting: Setting, made: PolarSpectrum, table: PolarTable) -> 
 
 def _points(setting: Setting) -> tuple[float, float, float]:
     """Points of all groups of rings, those of them between radii, and what all rings together take of them."""
-    points, rules = setting.points, setting.rules
-    ends = points.first + points.count
-    taken = 0
+    points, taken = setting.points, 0
+    low, high = (points.stretch * kappa for kappa in setting.rules.kappa_ends_per_um)
+    lines = np.split(points.kappa_per_um, points.first[1:])
     for ring, group in enumerate(points.group):
-        line = points.kappa_per_um[points.first[group] : ends[group]]
-        last = rules.first[ring] + rules.count[ring] - 1
-        low, high = points.stretch[ring] / rules.lambda_um[[last, rules.first[ring]]]
-        within = int(np.count_nonzero((line >= low) & (line <= high)))
+        line = lines[group]
+        within = int(np.count_nonzero((line >= low[ring]) & (line <= high[ring])))
         taken += within if points.on_nodes[group] else min(within + ORDER, len(line))
     return float(len(points.place)), float(points.count[~points.on_radii].sum()), float(taken)
 

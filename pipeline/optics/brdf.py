@@ -59,10 +59,15 @@ def integrand_of(config: Config) -> Callable[[float], Quadrature]:
     return partial(integrand, config.material, config.spectrum, config.coherence.sigma_um)
 
 
+def grey(lambda_nm: Array, cos_half: Array) -> Array:
+    """1 (..., L): nothing of R varies with wavelength, so all of it stays outside the spectral integral."""
+    return np.broadcast_to(1.0, (*np.shape(cos_half), len(lambda_nm)))
+
+
 def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Array, cos_half: Array) -> Array:
     """What of R stays inside the spectral integral (..., L) at half angles (...,): a metal's; 1 of all else."""
     if material.fresnel != "conductor":
-        return np.broadcast_to(1.0, (*np.shape(cos_half), len(lambda_nm)))
+        return grey(lambda_nm, cos_half)
     return _metal(material, trapezoid(spectrum, FINE_STEP_NM), lambda_nm, cos_half)
 
 

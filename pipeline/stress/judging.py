@@ -16,6 +16,7 @@ from pipeline.stress.cell import Cell, Precision, Way
 from pipeline.stress.device_ways import TAYLOR_TOLERANCE
 from pipeline.stress.reading import NO_DIGITS, Reading
 from pipeline.stress.series_way import in_memory
+from pipeline.stress.sweep import TALLEST_UM, TAYLOR_ENDS_UM
 from pipeline.stress.table_way import TABLE_DELTA_E, table_error
 from pipeline.surface.heightfield import HeightField
 
@@ -142,4 +143,4 @@ def criterion(outcomes: Sequence[Outcome]) -> Criterion:
             and (outcome.cell.basis, outcome.cell.precision, outcome.cell.height_um) == (basis, precision, height_um)
         )
 
-    return Criterion(worst("chebyshev", "float32", 10.0), worst("taylor", "float64", 2.0))
+    return Criterion(worst("chebyshev", "float32", TALLEST_UM), worst("taylor", "float64", TAYLOR_ENDS_UM))

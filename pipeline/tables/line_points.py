@@ -14,7 +14,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.spectral_operator import MOST_RINGS, ORDER, LinePoints
+from kernels.spectral_operator import MOST_RINGS, ORDER, LinePoints, w_max
 from pipeline.optics.geometry import Array
 from pipeline.tables.quadrature import RingQuadratures
 
@@ -42,13 +42,12 @@ class _Lines:
         self, radius_per_um: Array, s_nodes: int, s_max_per_um: float, rho: Array, quadratures: RingQuadratures
     ) -> None:
         self.rho, self.wavelengths, self._radius = rho, quadratures.count, radius_per_um
-        self.low = 1.0 / quadratures.lambda_um[quadratures.first + quadratures.count - 1]
-        self.high = 1.0 / quadratures.lambda_um[quadratures.first]
+        self.low, self.high = quadratures.kappa_ends_per_um
         self.first = _about(radius_per_um, rho * self.low)
         self.last = _about(radius_per_um, rho * self.high) + ORDER - 1
         self._spacing = np.diff(radius_per_um)
         # what a step of kappa does to s / s_max, and what one of r does to kappa
-        self._share_rate = 2.0 * pi * np.sqrt(np.maximum(4.0 - rho**2, 0.0)) / s_max_per_um
+        self._share_rate = 2.0 * pi * w_max(rho) / s_max_per_um
         self.kappa_rate = 1.0 / np.maximum(rho, np.finfo(np.float32).tiny)
         self._distances = s_nodes - 1  # of nodes in s
         self._end = 1.0 + min(_BEYOND, _BEYOND_BY_NODES / s_nodes**2)
@@ -91,8 +90,7 @@ def choose(
     lines = _Lines(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
     rings = _groups(lines)
     leader = np.cumsum(rings) - rings
-    first_ring = np.repeat(leader, rings)
-    stretch = np.where(np.repeat(rings, rings) > 1, rho * lines.kappa_rate[first_ring], 1.0)
+    stretch = np.where(np.repeat(rings, rings) > 1, rho * np.repeat(lines.kappa_rate[leader], rings), 1.0)
     on_radii, on_nodes = lines.on_radii[leader], lines.on_nodes[leader]
     first, last = np.minimum.reduceat(lines.first, leader), np.maximum.reduceat(lines.last, leader)
     low = np.minimum.reduceat(stretch * lines.low, leader)

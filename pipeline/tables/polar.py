@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from kernels import cubic_spline
 from kernels.spectral_operator import RingQuadratures
+from pipeline.optics.brdf import grey
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature
 from pipeline.spectrum import PolarSpectrum
 from pipeline.tables import spectral_integral
 from pipeline.tables.polar_grid import PolarGrid, Rings
-from pipeline.tables.spectral_integral import Reflectance, grey
+from pipeline.tables.spectral_integral import Reflectance
 
 # at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
 _LEAST_W2 = 1e-9

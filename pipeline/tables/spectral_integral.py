@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from kernels import spectral_operator
 from pipeline.errors import AccuracyError
+from pipeline.optics.brdf import grey
 from pipeline.optics.geometry import Array
 from pipeline.tables import line_points
 from pipeline.tables.quadrature import RingQuadratures
@@ -16,11 +17,6 @@ _MOST_BYTES = 2**32  # of all rings' weights over s: 10 um under the default win
 
 # R (..., L) inside the spectral integral from wavelengths in nm (L,) and cosines of half angles (...,)
 Reflectance = Callable[[Array, Array], Array]
-
-
-def grey(lambda_nm: Array, cos_half: Array) -> Array:
-    """Nothing of R varies with wavelength, so all of it stays outside the integral."""
-    return np.broadcast_to(1.0, (*cos_half.shape, len(lambda_nm)))
 
 
 def integrate(
