@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -114,13 +115,17 @@ def teller(config: Any, store: Any) -> Callable[[Any, float | None], None]:
 
 @contextmanager
 def showing_progress() -> Iterator[Progress]:
-    """A live bar on a terminal; elsewhere a line when a step that lasts begins to."""
-    # without any stderr (2>&-) Python has none either
-    if sys.stderr is not None and sys.stderr.isatty():
-        with _bar() as progress:
-            yield progress
-    else:
-        yield _Lines()
+    """A live bar on a terminal; elsewhere a line when a step that lasts begins to. Compiling kernels gets a line."""
+    from kernels.device import announcing_compilation
+
+    # functools' cache: one line, however many kernels are compiled
+    with announcing_compilation(cache(lambda: note("  compiling kernels for this processor, once ..."))):
+        # without any stderr (2>&-) Python has none either
+        if sys.stderr is not None and sys.stderr.isatty():
+            with _bar() as progress:
+                yield progress
+        else:
+            yield _Lines()
 
 
 class _Lines:

@@ -4,12 +4,13 @@ A device counts as working only when a kernel was built and run on it: drivers e
 cannot compile for it. Contexts do not survive a fork, so they are made lazily, once per process.
 """
 
+import hashlib
 import os
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -23,15 +24,32 @@ from filelock import FileLock
 DEVICE_VARIABLE = "DIFFRACT_BAKE_DEVICE"
 _LINE = 64  # bytes of a cache line, and of a vector
 _MOST_SPARE_BYTES = 2**28
-REMEDY = (
+_POCL = "Portable Computing Language"  # PoCL's name of its platform
+_INSTALL = (
     "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
     "`conda install -c conda-forge pocl`; then `diffract-bake doctor` shows what was found"
 )
 
+# -w: without AVX-512, PoCL's compiler warns of every vector argument that its ABI differs; errors still come through
+_OPTIONS = ["-cl-mad-enable", "-w"]
+
 # of each of three arrays: more than last caches hold
 _TRIAD_BYTES = 2**27
 
-_PROBE = "__kernel void probe(__global double *x) { x[get_global_id(0)] = 2.0 * get_global_id(0); }"
+# doubles, and the floats of a vector register that the compiler builds for: PoCL states the processor's own even
+# where it builds for another one (POCL_LLVM_CPU_NAME)
+_PROBE = """
+#if defined(__AVX512F__)
+#define WIDTH 16
+#elif defined(__AVX__)
+#define WIDTH 8
+#elif defined(__SSE2__) || defined(__ARM_NEON)
+#define WIDTH 4
+#else
+#define WIDTH 0
+#endif
+__kernel void probe(__global double *x) { x[get_global_id(0)] = 2.0 * get_global_id(0) + WIDTH; }
+"""
 
 
 class NoDeviceError(RuntimeError):
@@ -40,13 +58,17 @@ class NoDeviceError(RuntimeError):
 
 @dataclass(frozen=True)
 class Probe:
-    """One listed device and whether it works; `fault` is empty where it does."""
+    """One listed device and whether it works.
+
+    vector_width: floats of a vector register that its compiler builds for. fault: empty where it works.
+    """
 
     platform: str
     device: str
     driver: str
     compute_units: int
     memory_bytes: int
+    vector_width: int
     fault: str
     handle: Any
 
@@ -64,11 +86,36 @@ def cache_folder() -> Path:
     return folder
 
 
+_listeners: list[Callable[[], None]] = []
+
+
 @contextmanager
-def _compiling() -> Iterator[None]:
-    """Holds the kernel cache alone: PoCL's cache fails at random when processes fill it together."""
-    with FileLock(cache_folder() / "lock"):
+def announcing_compilation(announce: Callable[[], None]) -> Iterator[None]:
+    """Calls `announce` before each program or kernel that this machine has not compiled yet, while it lasts."""
+    _listeners.append(announce)
+    try:
         yield
+    finally:
+        _listeners.remove(announce)
+
+
+@contextmanager
+def _compiling(identity: str) -> Iterator[None]:
+    """Holds the kernel cache alone: PoCL's cache fails at random when processes fill it together.
+
+    identity: of the program or kernel. A mark beside the cache remembers that it was compiled.
+    """
+    mark = cache_folder() / "compiled" / hashlib.sha256(identity.encode()).hexdigest()
+    with FileLock(cache_folder() / "lock"):
+        if mark.exists():
+            yield
+            return
+        for announce in _listeners:
+            announce()
+        yield
+        with suppress(OSError):  # without its mark, the next process announces it once more
+            mark.parent.mkdir(exist_ok=True)
+            mark.touch()
 
 
 @cache
@@ -84,41 +131,51 @@ def _opencl() -> Any:
 
 def probe_devices() -> list[Probe]:
     """Every listed OpenCL device, each tried by building and running a kernel on it."""
+    return [_probe(platform, device) for platform, device in _listed()]
+
+
+def _listed() -> list[tuple[Any, Any]]:
+    """Every OpenCL device with its platform, untried."""
     cl = _opencl()
     try:
         platforms = cl.get_platforms()
     except cl.Error:  # the loader's word for "no driver installed"
         return []
-    return [_probe(platform, device) for platform in platforms for device in platform.get_devices()]
+    return [(platform, device) for platform in platforms for device in platform.get_devices()]
 
 
 def _probe(platform: Any, device: Any) -> Probe:
     cl = _opencl()
-    fault = ""
+    name, driver = device.name.strip(), f"{device.driver_version}, {device.version.strip()}"
+    fault, out = "", np.zeros(4)
     try:
-        with _compiling():
+        with _compiling(f"{driver} {name} {_PROBE}"):
             context = cl.Context([device])
             queue = cl.CommandQueue(context)
-            out = np.zeros(4)
             buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, out.nbytes)
-            cl.Program(context, _PROBE).build().probe(queue, (4,), None, buffer)
+            cl.Program(context, _PROBE).build(_OPTIONS).probe(queue, (4,), None, buffer)
             cl.enqueue_copy(queue, out, buffer)
-        if not np.array_equal(out, [0.0, 2.0, 4.0, 6.0]):
-            fault = f"a test kernel gave {out.tolist()} instead of [0, 2, 4, 6]"
+        if not np.array_equal(out - out[0], [0.0, 2.0, 4.0, 6.0]):
+            fault = f"a test kernel gave {out.tolist()} instead of steps of 2"
     except cl.Error as error:
         fault = " ".join(str(error).split())[:200]
-    driver = f"{device.driver_version}, {device.version.strip()}"
-    name = device.name.strip()
-    return Probe(platform.name, name, driver, device.max_compute_units, device.global_mem_size, fault, device)
+    width = int(out[0]) or device.native_vector_width_float
+    units, memory = device.max_compute_units, device.global_mem_size
+    return Probe(platform.name, name, driver, units, memory, width, fault, device)
 
 
 @dataclass(frozen=True)
 class Device:
-    """The device in use, its context and its in-order queue. shares_memory: whether its memory is the process's."""
+    """The device in use, its context and its in-order queue.
+
+    vector_width: floats of a vector register, 4, 8 or 16; blocks of every kernel follow it.
+    shares_memory: whether its memory is the process's.
+    """
 
     name: str
     driver: str
     compute_units: int
+    vector_width: int
     shares_memory: bool
     context: Any
     queue: Any
@@ -126,21 +183,53 @@ class Device:
 
 @cache
 def default_device() -> Device:
-    """The first working device, or the first whose name holds $DIFFRACT_BAKE_DEVICE.
+    """The first working CPU device of PoCL, or the first of any kind whose name holds $DIFFRACT_BAKE_DEVICE.
 
     Raises NoDeviceError with what was tried and the remedy.
     """
-    wanted = os.environ.get(DEVICE_VARIABLE, "")
-    probes = probe_devices()
+    wanted, listed = os.environ.get(DEVICE_VARIABLE, ""), _listed()
+    probes = [_probe(*pair) for pair in listed if _is_asked_for(*pair, wanted)]
     for probe in probes:
-        if not probe.fault and wanted.lower() in f"{probe.platform} {probe.device}".lower():
+        if not probe.fault:
             context = _opencl().Context([probe.handle])
             queue = _opencl().CommandQueue(context)
+            width = min(16, max(4, probe.vector_width))
             shares = bool(probe.handle.host_unified_memory)
-            return Device(probe.device, probe.driver, probe.compute_units, shares, context, queue)
-    tried = "; ".join(f"{p.device}: {p.fault or 'works, but not asked for'}" for p in probes) or "none is listed"
-    asked = f" named like {wanted!r} (from {DEVICE_VARIABLE})" if wanted else ""
-    raise NoDeviceError(f"no working OpenCL device{asked}: {tried}. To mend it, {REMEDY}")
+            return Device(probe.device, probe.driver, probe.compute_units, width, shares, context, queue)
+    tried = "; ".join(f"{probe.device}: {probe.fault}" for probe in probes)
+    raise NoDeviceError(_why_none(wanted, [device.name.strip() for _, device in listed], tried))
+
+
+def _is_asked_for(platform: Any, device: Any, wanted: str) -> bool:
+    """Whether the variable's value names a device; without a value, whether it is a CPU under PoCL."""
+    if wanted:
+        return wanted.lower() in f"{platform.name} {device.name}".lower()
+    return bool(platform.name == _POCL and device.type & _opencl().device_type.CPU)
+
+
+def _why_none(wanted: str, names: list[str], tried: str) -> str:
+    """The message of NoDeviceError: what was found, and what to do."""
+    if not names:
+        return f"no working OpenCL device: none is listed. To mend it, {_INSTALL}"
+    listed = ", ".join(repr(name) for name in names)
+    if wanted:
+        found = f"the one named like {wanted!r} does not work: {tried}" if tried else f"none is named like {wanted!r}"
+        return (
+            f"no working OpenCL device: {DEVICE_VARIABLE} asks for {wanted!r}, and {found}. Set it to a part of one "
+            f"of these names: {listed}; or unset it, and PoCL's CPU device is taken"
+        )
+    found = tried or f"PoCL lists no CPU; {listed} is taken only when {DEVICE_VARIABLE} names it"
+    return f"no working OpenCL device: {found}. To mend it, {_INSTALL}"
+
+
+def bound(count: int, least: int) -> int:
+    """The least of `least`, 4 `least`, 16 `least` ... that is not below `count`.
+
+    What a kernel keeps in arrays of its own must be bounded when it is compiled; few bounds mean few programs.
+    """
+    while least < count:
+        least *= 4
+    return least
 
 
 def program(sources: tuple[str, ...], constants: Mapping[str, int | str]) -> "Program":
@@ -182,8 +271,9 @@ class Program:
         cl = _opencl()
         self.device = default_device()
         text = "\n".join(source(name) for name in sources)
-        options = ["-cl-mad-enable", *(f"-D{key}={value}" for key, value in sorted(constants.items()))]
-        with _compiling():
+        options = [*_OPTIONS, *(f"-D{key}={value}" for key, value in sorted(constants.items()))]
+        self._identity = f"{self.device.driver} {self.device.name} {self.device.vector_width} {options} {text}"
+        with _compiling(self._identity):
             self._program = cl.Program(self.device.context, text).build(options)
         self._kernels: dict[str, Any] = {}
 
@@ -192,7 +282,7 @@ class Program:
         if kernel not in self._kernels:
             self._kernels[kernel] = getattr(self._program, kernel)
             # PoCL finishes compiling at the first launch
-            with _compiling():
+            with _compiling(f"{kernel} {self._identity}"):
                 self._enqueue(kernel, size, arguments)
             return
         self._enqueue(kernel, size, arguments)

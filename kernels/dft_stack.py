@@ -8,11 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import device
+from kernels import blocks, device
 
 _VECTOR_BYTES = 64
-_KEPT = 10  # frequencies whose sums stay in registers, two vectors each
-_STEP_X, _STEP_Y = 10, 5  # the same of the first step, with sums of two and of four vectors
 _MOST_PAIRS = 128
 _ITEMS_A_UNIT = 4  # work-items, each with scratch that stays in a core's cache
 _AXIS = np.dtype([(name, np.int32) for name in ("n", "n1", "n2", "pairs", "padded", "blocks")])
@@ -48,18 +46,18 @@ def transform(
     ny, nx = heights_um.shape
     lanes, terms = _VECTOR_BYTES // out.dtype.itemsize, out.shape[3]
     columns, rows = max(kept.phi_max, kept.reach) + 1, kept.shape[0]
-    x = _axis(nx, np.arange(columns), _STEP_X, out.dtype)
-    y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), _STEP_Y, out.dtype)
+    sizes = blocks.chosen("STEP_X", "STEP_Y", "KEPT")
+    x = _axis(nx, np.arange(columns), sizes["STEP_X"], sizes["KEPT"], out.dtype)
+    y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), sizes["STEP_Y"], sizes["KEPT"], out.dtype)
     program = device.program(
         ("dft_stack.cl",),
         {
             "REAL": "float" if out.dtype == np.float32 else "double",
             "LANES": lanes,
             "CHEBYSHEV": int(series == "chebyshev"),
-            "STEP_X": _STEP_X,
-            "STEP_Y": _STEP_Y,
-            "KEPT": _KEPT,
             "MOST_PAIRS": _MOST_PAIRS,
+            "MOST_STEP": max(sizes["STEP_X"], sizes["STEP_Y"]),
+            **sizes,
         },
     )
     items, room = _ITEMS_A_UNIT * device.default_device().compute_units, max(3 * nx, 2 * ny)
@@ -76,30 +74,30 @@ def transform(
         program.launch(
             "along_x", (items,), samples, np.float64(scale_per_um), start, *x, np.int32(ny), *scratch, narrow
         )
-        sizes = (np.int32(n) for n in (first, terms, kept.reach, kept.phi_max, rows))
-        program.launch("along_y", (items,), narrow, *y, np.int32(columns), *scratch, *sizes, mean, result)
+        shape = (np.int32(n) for n in (first, terms, kept.reach, kept.phi_max, rows))
+        program.launch("along_y", (items,), narrow, *y, np.int32(columns), *scratch, *shape, mean, result)
         done(min(1.0, (first + lanes) / terms))
     return device.settle(result, out)
 
 
-def _axis(n: int, kept: NDArray[np.int64], step: int, dtype: Any) -> list[Any]:
+def _axis(n: int, frequencies: NDArray[np.int64], step: int, kept: int, dtype: Any) -> list[Any]:
     """The tables of one axis of n = n1 n2 samples, on the device, and its sizes."""
     n1 = max(d for d in range(1, min(isqrt(n), 2 * _MOST_PAIRS - 2) + 1) if n % d == 0)
     n2, pairs = n // n1, n1 // 2 + 1
     padded = step * ceil(pairs / step)
     angle = 2.0 * np.pi * np.outer(np.arange(pairs), np.arange(padded)) / n1
-    parts = [part for k1 in range(n1) for part in _parts(np.flatnonzero(kept % n1 == k1))]
-    place = np.full((len(parts), _KEPT), -1, np.int32)
-    turn = np.zeros((len(parts), n2, _KEPT))
+    parts = [part for k1 in range(n1) for part in _parts(np.flatnonzero(frequencies % n1 == k1), kept)]
+    place = np.full((len(parts), kept), -1, np.int32)
+    turn = np.zeros((len(parts), n2, kept))
     for at, turned, part in zip(place, turn, parts, strict=True):
         at[: len(part)] = part
         # whole turns go first: their sines would lose digits
-        turned[:, : len(part)] = 2.0 * np.pi / n * (np.outer(np.arange(n2), kept[part]) % n)
+        turned[:, : len(part)] = 2.0 * np.pi / n * (np.outer(np.arange(n2), frequencies[part]) % n)
     tables = np.cos(angle), np.sin(angle), np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    first_of = np.array([kept[part[0]] % n1 for part in parts], np.int32)
+    first_of = np.array([frequencies[part[0]] % n1 for part in parts], np.int32)
     buffers = [device.upload(a) for a in (*(t.astype(dtype) for t in tables), first_of, place)]
     return [*buffers, np.array((n, n1, n2, pairs, padded, len(parts)), _AXIS)]
 
 
-def _parts(indices: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    return [indices[first : first + _KEPT] for first in range(0, len(indices), _KEPT)]
+def _parts(indices: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
+    return [indices[first : first + size] for first in range(0, len(indices), size)]

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from kernels import device
+from kernels import blocks, device
 from kernels.diffraction import DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
-_MOST_TOGETHER = 6  # nodes in s whose four sums stay in registers
-_RADII = 8  # neighbours, whose windows share most of what they read
+# what a work-item's memory is compiled for; more takes a program of its own, four times as large
+_BLOCKS_BOUND, _TAPS_BOUND = 4, 17
 
 
 def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarray, series: np.ndarray) -> np.ndarray:
@@ -17,22 +17,29 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     follows it in E, tile by tile. `series` (terms, s nodes) holds (2 - [n = 0]) J_n(s H).
     """
     terms, nodes = series.shape
-    s_block = -(-nodes // -(-nodes // _MOST_TOGETHER))
     # i^n, n = 2 m or 2 m + 1: the kernel keeps even and odd terms apart, which leaves (-1)^m
     signs = (-1.0) ** (np.arange(terms) // 2)
-    padded = np.zeros((LANES * stack.constants["BLOCKS"], nodes), np.float32)
+    term_blocks = stack.constants["BLOCKS"]
+    padded = np.zeros((LANES * term_blocks, nodes), np.float32)
     padded[:terms] = signs[:, None] * series
     tiles = azimuth_rad.reshape(-1, LANES)
     directions = np.stack([np.cos(tiles), np.sin(tiles)], axis=1)
-    constants = {key: stack.constants[key] for key in ("BLOCKS", "REACH_X", "REACH_Y")}
-    constants |= {"TERMS": terms + terms % 2, "S_NODES": nodes, "S_BLOCK": s_block, "RADII": _RADII}
+    reach = stack.constants["REACH_X"], stack.constants["REACH_Y"]
+    sizes = blocks.chosen("RADII", "S_BLOCK")
+    constants = {
+        "RADII": sizes["RADII"],
+        # a flat surface has fewer nodes than a block
+        "S_BLOCK": sizes["S_BLOCK"] if nodes >= sizes["S_BLOCK"] else 1,
+        "MOST_BLOCKS": device.bound(term_blocks, _BLOCKS_BOUND),
+        "MOST_TAPS": device.bound(2 * max(reach) + 1, _TAPS_BOUND),
+    }
     program = device.program(("polar_spectrum.cl",), constants)
     radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))
     out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
     result = device.shared(out)
     program.launch(
         "polar_spectrum",
-        (-(-len(radius_per_um) // _RADII), len(tiles)),
+        (-(-len(radius_per_um) // sizes["RADII"]), len(tiles)),
         stack.buffer,
         stack.decay,
         stack.grid,
@@ -40,6 +47,7 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
         np.int32(len(radius_per_um)),
         direction,
         terms_at_s,
+        *(np.int32(n) for n in (terms + terms % 2, term_blocks, nodes, *reach)),
         *(np.float64(f) for f in stack.band_per_um),
         result,
     )

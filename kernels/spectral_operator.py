@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from kernels import device
+from kernels import blocks, device
 from kernels.diffraction import fourth_column
 from kernels.polar_spectrum import LANES
 
 ORDER = 8  # nodes of every interpolation, over r and along kappa
 MOST_RINGS = 8  # of a group, whose sums stay in the nearest cache
+# what a work-item's memory is compiled for; more takes a program of its own, four times as large
+_S_NODES_BOUND, _W_TERMS_BOUND = 64, 32
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,8 @@ def integrate(
     to_w_terms = device.upload(_to_w_terms(rho, points, w_terms).astype(np.float32))
     out = device.empty((rings, 3 * w_terms, LANES * tiles), np.float32)
     power, result = device.lent(spectrum), device.shared(out)
-    size = len(points.rings), tiles // 2
-    program.launch("apply_operator", size, power, np.int32(radii), *operator, to_w_terms, result)
+    size, sizes = (len(points.rings), tiles // 2), (np.int32(s_nodes), np.int32(w_terms))
+    program.launch("apply_operator", size, power, np.int32(radii), *operator, *sizes, to_w_terms, result)
     return device.settle(result, out)
 
 
@@ -102,14 +104,7 @@ def _operator(
 ) -> tuple[device.Program, list[Any]]:
     """The program, and the operator of every group from E on `s_nodes`, on the device, in the kernels' order."""
     w_terms = reflectance.shape[1]
-    constants = {
-        "ORDER": ORDER,
-        "S_NODES": s_nodes,
-        "W_TERMS": w_terms,
-        "W_BLOCK": 4 if w_terms % 8 else 8,
-        "MOST_RINGS": MOST_RINGS,
-    }
-    program = device.program(("spectral_operator.cl",), constants)
+    program = _program(s_nodes, w_terms)
     where = [device.upload(a.astype(np.int32)) for a in (_groups(points), _rings(points, quadratures), points.place)]
     inputs = [
         device.upload(a)
@@ -128,8 +123,20 @@ def _operator(
     count, shares = len(points.place), int(points.rings @ points.count)
     floats = count * ORDER, count * s_nodes * w_terms, shares * 3 * w_terms, 2 * len(rho)
     weights = [device.result_buffer(4 * n) for n in floats]
-    program.launch("build_operator", (len(points.rings),), *where, *inputs, np.float32(s_max_per_um), *weights)
+    sizes = np.float32(s_max_per_um), np.int32(s_nodes), np.int32(w_terms)
+    program.launch("build_operator", (len(points.rings),), *where, *inputs, *sizes, *weights)
     return program, [*where, *weights]
+
+
+def _program(s_nodes: int, w_terms: int) -> device.Program:
+    constants = {
+        "ORDER": ORDER,
+        "MOST_RINGS": MOST_RINGS,
+        "MOST_S_NODES": device.bound(s_nodes, _S_NODES_BOUND),
+        "MOST_W_TERMS": device.bound(w_terms, _W_TERMS_BOUND),
+        **blocks.chosen("W_BLOCK", "SHARE_BLOCK"),
+    }
+    return device.program(("spectral_operator.cl",), constants)
 
 
 def _groups(points: LinePoints) -> np.ndarray:

@@ -4,12 +4,13 @@
  * the spline through (..., c_(i-1), c_i, c_(i+1), c_(i+2), ...) has the four weights of `spline`. Between samples that is half
  * the error of Catmull-Rom, and its weights are positive: four bilinear fetches make one bicubic.
  *
- *   table   float[rings][OUT][azimuths]     outputs of the spectral operator; azimuths is a multiple of 32
+ *   table   float[rings][3 w_terms][azimuths]   outputs of the spectral operator; azimuths is a multiple of 32
  *
  * Rings go on below the first, which is one point, as the opposite half turn: (-i, a) = (i, a + azimuths / 2); beyond the
- * last they are mirrored. Azimuths are periodic. Set by the host: OUT = 3 W_TERMS outputs of a look-up.
+ * last they are mirrored. Azimuths are periodic.
  */
 
+#define UNROLL _Pragma("unroll")
 #define Z (-0.26794919f)
 #define Z2 (Z * Z)
 #define Z4 (Z2 * Z2)
@@ -112,6 +113,13 @@ static float4 spline(const float t) {
     return (float4)(u * u * u, 4.0f - 3.0f * t * t * (2.0f - t), 4.0f - 3.0f * u * u * (2.0f - u), t * t * t) / 6.0f;
 }
 
+/* A table's value between samples: sixteen of them, by their places in one output, and their weights */
+static float between(__global const float *output, const long *place, const float *weight) {
+    float sum = 0.0f;
+    UNROLL for (int tap = 0; tap < 16; ++tap) sum = fma(weight[tap], output[place[tap]], sum);
+    return sum;
+}
+
 /* Values at places between the samples.
  *
  *   cell    int2[directions]        the ring and the azimuth below a place
@@ -120,34 +128,33 @@ static float4 spline(const float t) {
  *
  * One work-item, one direction.
  */
-__kernel void look_up(__global const float *table, const int rings, const int azimuths, __global const int2 *cell,
-                      __global const float4 *place, __global float4 *value) {
+__kernel void look_up(__global const float *table, const int rings, const int azimuths, const int w_terms,
+                      __global const int2 *cell, __global const float4 *place, __global float4 *value) {
     const int2 below = cell[get_global_id(0)];
     const float4 at = place[get_global_id(0)];
     const float4 across = spline(at.x), along = spline(at.y);
-    float sum[OUT];
-    for (int o = 0; o < OUT; ++o) sum[o] = 0.0f;
+    long taken[16];
+    float weight[16];
     for (int i = 0; i < 4; ++i) {
         int opposite;
-        const int ring = ring_of(below.x - 1 + i, rings, &opposite);
+        const long ring = ring_of(below.x - 1 + i, rings, &opposite);
         const int first = below.y - 1 + (opposite ? azimuths / 2 : 0) + azimuths;
-        const int4 a = (first + (int4)(0, 1, 2, 3)) % azimuths;
-        const float4 weight = ((const float *)&across)[i] * along;
-        for (int o = 0; o < OUT; ++o) {
-            __global const float *row = table + (long)(ring * OUT + o) * azimuths;
-            sum[o] += dot(weight, (float4)(row[a.x], row[a.y], row[a.z], row[a.w]));
+        for (int j = 0; j < 4; ++j) {
+            taken[4 * i + j] = ring * 3 * w_terms * azimuths + (first + j) % azimuths;
+            weight[4 * i + j] = ((const float *)&across)[i] * ((const float *)&along)[j];
         }
     }
     float xyz[4] = {0.0f, 0.0f, 0.0f, 0.0f};
     for (int c = 0; c < 3; ++c) {
         /* Clenshaw's recurrence */
+        __global const float *channel = table + (long)c * w_terms * azimuths;
         float b1 = 0.0f, b2 = 0.0f;
-        for (int k = W_TERMS - 1; k > 0; --k) {
-            const float b = 2.0f * at.z * b1 - b2 + sum[c * W_TERMS + k];
+        for (int k = w_terms - 1; k > 0; --k) {
+            const float b = 2.0f * at.z * b1 - b2 + between(channel + (long)k * azimuths, taken, weight);
             b2 = b1;
             b1 = b;
         }
-        xyz[c] = at.z * b1 - b2 + sum[c * W_TERMS];
+        xyz[c] = at.z * b1 - b2 + between(channel, taken, weight);
     }
     value[get_global_id(0)] = vload4(0, xyz);
 }

@@ -16,13 +16,15 @@
  *   first_of       int[blocks]                   a block's k1
  *   place          int[blocks][KEPT]             where F[k] goes: its column or row; -1 for nothing
  *
- * Set by the host: REAL and its vectors of LANES; CHEBYSHEV 0 or 1; STEP_X, STEP_Y; KEPT; MOST_PAIRS, which bounds
- * pairs. Work-items take rows or columns get_global_size(0) apart, each with `room` vectors of scratch of its own: they
+ * Set by the host: REAL and its vectors of LANES; CHEBYSHEV 0 or 1; STEP_X and STEP_Y, at most MOST_STEP; KEPT;
+ * MOST_PAIRS, which bounds pairs. Work-items take rows or columns get_global_size(0) apart, each with `room` vectors of scratch of its own: they
  * outgrow the stacks of a driver's threads.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
+#define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
+#define INLINE __attribute__((always_inline))
 #define JOIN(a, b) a##b
 #define NAME(a, b) JOIN(a, b)
 #define VECTOR NAME(REAL, LANES)
@@ -32,19 +34,31 @@ typedef struct {
     int n, n1, n2, pairs, padded, blocks;
 } Axis;
 
+/* T_first and T_(first - 1) of eight samples t, doubling the order: T_2n = 2 T_n^2 - 1, T_(2n - 1) = 2 T_n T_(n-1) - t */
+static void chebyshev(const double8 t, const int first, double8 *term, double8 *before) {
+    double8 here = 1.0, below = t;
+    ROLLED for (int bit = first ? 31 - clz(first) : -1; bit >= 0; --bit) {
+        /* from T_n, T_(n - 1) to orders 2 n, 2 n - 1, and one further where the bit is set */
+        const double8 even = 2.0 * here * here - 1.0, odd = 2.0 * here * below - t;
+        const int further = first >> bit & 1;
+        here = further ? 2.0 * t * even - odd : even;
+        below = further ? even : odd;
+    }
+    *term = here;
+    *before = below;
+}
+
 /* terms first .. first + LANES - 1 of eight samples t, a vector each */
 static void terms_of(const double8 t, const int first, __global REAL *out) {
     double8 before, term;
     if (CHEBYSHEV) {
-        const double8 angle = acos(clamp(t, (double8)-1.0, (double8)1.0));
-        term = first == 0 ? (double8)1.0 : cos(first * angle);
-        before = first == 0 ? t : cos((first - 1) * angle);
+        chebyshev(t, first, &term, &before);
     } else {
         term = 1.0;
         for (int n = 0; n < first; ++n) term *= t;
         before = 0.0;
     }
-    for (int n = 0; n < LANES; ++n) {
+    ROLLED for (int n = 0; n < LANES; ++n) {
         UNROLL for (int i = 0; i < 8; ++i) out[i * LANES + n] = ((const double *)&term)[i];
         const double8 next = CHEBYSHEV ? 2.0 * t * term - before : t * term;
         before = term;
@@ -52,18 +66,71 @@ static void terms_of(const double8 t, const int first, __global REAL *out) {
     }
 }
 
-/* Samples n1 = 0 .. and their mirror images N1 - n1, `stride` apart: their sums and differences. */
-static void pair(__global const VECTOR *sample, const long stride, const Axis axis, VECTOR *sum, VECTOR *difference) {
+/* Samples n1 = 0 .. and their mirror images N1 - n1, `stride` apart: their sums and differences, `parts` vectors each. */
+static INLINE void pair(__global const VECTOR *sample, const long stride, const Axis axis, const int parts, VECTOR *sum,
+                        VECTOR *difference) {
     for (int n1 = 0; n1 < axis.pairs; ++n1) {
         const int alone = n1 == 0 || 2 * n1 == axis.n1;
-        const VECTOR a = sample[n1 * stride], b = alone ? (VECTOR)0 : sample[(axis.n1 - n1) * stride];
-        sum[n1] = a + b;
-        difference[n1] = alone ? (VECTOR)0 : a - b;
+        UNROLL for (int part = 0; part < parts; ++part) {
+            const VECTOR here = sample[n1 * stride + part];
+            const VECTOR mirrored = alone ? (VECTOR)0 : sample[(axis.n1 - n1) * stride + part];
+            sum[n1 * parts + part] = here + mirrored;
+            difference[n1 * parts + part] = alone ? (VECTOR)0 : here - mirrored;
+        }
     }
 }
 
-/* F of the KEPT frequencies of a block, from the n2 values A of its k1: (re, im) pairs. */
-static void frequencies(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR *re, VECTOR *im) {
+/* The first step's sums over n1 at `step` of its k1: cosines with sums, sines with differences; [k1][part] each. */
+static INLINE void sums_over_n1(const VECTOR *sum, const VECTOR *difference, __global const REAL *cosine,
+                                __global const REAL *sine, const Axis axis, const int parts, const int step, VECTOR *c,
+                                VECTOR *s) {
+    VECTOR even[2 * MOST_STEP], odd[2 * MOST_STEP];
+    UNROLL for (int j = 0; j < parts * step; ++j) even[j] = odd[j] = 0;
+    for (int n1 = 0; n1 < axis.pairs; ++n1)
+        UNROLL for (int j = 0; j < step; ++j) {
+            const VECTOR c_j = cosine[n1 * axis.padded + j], s_j = sine[n1 * axis.padded + j];
+            UNROLL for (int part = 0; part < parts; ++part) {
+                even[parts * j + part] = fma(c_j, sum[n1 * parts + part], even[parts * j + part]);
+                odd[parts * j + part] = fma(s_j, difference[n1 * parts + part], odd[parts * j + part]);
+            }
+        }
+    UNROLL for (int j = 0; j < parts * step; ++j) {
+        c[j] = even[j];
+        s[j] = odd[j];
+    }
+}
+
+/* A[k1][n2] = c + i s and A[N1 - k1][n2] = c - i s, of real samples or of complex ones (parts = 2). */
+static INLINE void store_pair(const VECTOR *c, const VECTOR *s, const int k1, const int n2, const Axis axis,
+                              const int parts, __global VECTOR *a) {
+    if (k1 >= axis.pairs) return;
+    const VECTOR im_c = parts == 2 ? c[1] : (VECTOR)0, im_s = parts == 2 ? s[1] : (VECTOR)0;
+    __global VECTOR *here = a + 2 * (k1 * axis.n2 + n2), *mirrored = a + 2 * ((axis.n1 - k1) * axis.n2 + n2);
+    here[0] = c[0] - im_s;
+    here[1] = im_c + s[0];
+    if (k1 > 0 && 2 * k1 < axis.n1) {
+        mirrored[0] = c[0] + im_s;
+        mirrored[1] = im_c - s[0];
+    }
+}
+
+/* The first step: A[k1][n2] of every k1 and n2, as (re, im) pairs; `parts` 1 for real samples, 2 for complex ones. */
+static INLINE void first_step(__global const VECTOR *sample, __global const REAL *cosine, __global const REAL *sine,
+                              const Axis axis, const int parts, const int step, __global VECTOR *a) {
+    for (int n2 = 0; n2 < axis.n2; ++n2) {
+        VECTOR sum[2 * MOST_PAIRS], difference[2 * MOST_PAIRS];
+        pair(sample + parts * n2, parts * axis.n2, axis, parts, sum, difference);
+        for (int k = 0; k < axis.pairs; k += step) {
+            VECTOR c[2 * MOST_STEP], s[2 * MOST_STEP];
+            sums_over_n1(sum, difference, cosine + k, sine + k, axis, parts, step, c, s);
+            ROLLED for (int j = 0; j < step; ++j) store_pair(c + parts * j, s + parts * j, k + j, n2, axis, parts, a);
+        }
+    }
+}
+
+/* The second step: F of the KEPT frequencies of a block, from the n2 values A of its k1: f[frequency][re, im]. */
+static void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[2]) {
+    VECTOR re[KEPT], im[KEPT];
     UNROLL for (int q = 0; q < KEPT; ++q) re[q] = im[q] = 0;
     for (int n2 = 0; n2 < n2s; ++n2) {
         UNROLL for (int q = 0; q < KEPT; ++q) {
@@ -71,6 +138,10 @@ static void frequencies(__global const VECTOR *a, __global const REAL *turn, con
             re[q] = fma(c, a[2 * n2], fma(-s, a[2 * n2 + 1], re[q]));
             im[q] = fma(s, a[2 * n2], fma(c, a[2 * n2 + 1], im[q]));
         }
+    }
+    UNROLL for (int q = 0; q < KEPT; ++q) {
+        f[q][0] = re[q];
+        f[q][1] = im[q];
     }
 }
 
@@ -89,50 +160,34 @@ __kernel void along_x(__global const double *heights, const double scale, const 
     for (int y = get_global_id(0); y < ny; y += get_global_size(0)) {
         __global const double *row = heights + (long)((y + ny / 2) % ny) * nx;
         /* the samples from the middle on, then those before it; what spills over their ends is written again */
-        for (int part = 0; part < 2; ++part) {
+        ROLLED for (int part = 0; part < 2; ++part) {
             const int begin = part ? 0 : nx / 2, end = part ? nx / 2 : nx, to = part ? nx - nx / 2 : -(nx / 2);
-            for (int x = begin; x < end; x += 8) {
+            ROLLED for (int x = begin; x < end; x += 8) {
                 double8 t = 0.0;
                 if (x + 8 <= end) t = vload8(0, row + x);
-                else for (int i = 0; i < end - x; ++i) ((double *)&t)[i] = row[x + i];
+                else ROLLED for (int i = 0; i < end - x; ++i) ((double *)&t)[i] = row[x + i];
                 terms_of(scale * t, first, (__global REAL *)(sample + to + x));
             }
         }
-        for (int n2 = 0; n2 < axis.n2; ++n2) {
-            VECTOR sum[MOST_PAIRS], difference[MOST_PAIRS];
-            pair(sample + n2, axis.n2, axis, sum, difference);
-            for (int k = 0; k < axis.pairs; k += STEP_X) {
-                VECTOR c[STEP_X], s[STEP_X];
-                UNROLL for (int j = 0; j < STEP_X; ++j) c[j] = s[j] = 0;
-                for (int n1 = 0; n1 < axis.pairs; ++n1)
-                    UNROLL for (int j = 0; j < STEP_X; ++j) {
-                        c[j] = fma((VECTOR)cosine[n1 * axis.padded + k + j], sum[n1], c[j]);
-                        s[j] = fma((VECTOR)sine[n1 * axis.padded + k + j], difference[n1], s[j]);
-                    }
-                UNROLL for (int j = 0; j < STEP_X; ++j) {
-                    const int k1 = k + j;
-                    if (k1 < axis.pairs) {
-                        a[2 * (k1 * axis.n2 + n2)] = c[j];
-                        a[2 * (k1 * axis.n2 + n2) + 1] = s[j];
-                        if (k1 > 0 && 2 * k1 < axis.n1) {
-                            a[2 * ((axis.n1 - k1) * axis.n2 + n2)] = c[j];
-                            a[2 * ((axis.n1 - k1) * axis.n2 + n2) + 1] = -s[j];
-                        }
-                    }
-                }
-            }
-        }
+        first_step(sample, cosine, sine, axis, 1, STEP_X, a);
         for (int b = 0; b < axis.blocks; ++b) {
-            VECTOR re[KEPT], im[KEPT];
-            frequencies(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, re, im);
-            UNROLL for (int q = 0; q < KEPT; ++q) {
+            VECTOR f[KEPT][2];
+            second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
+            ROLLED for (int q = 0; q < KEPT; ++q) {
                 const int column = place[b * KEPT + q];
-                if (column >= 0) {
-                    narrow[2 * ((long)column * ny + y)] = re[q];
-                    narrow[2 * ((long)column * ny + y) + 1] = im[q];
-                }
+                if (column < 0) continue;
+                narrow[2 * ((long)column * ny + y)] = f[q][0];
+                narrow[2 * ((long)column * ny + y) + 1] = f[q][1];
             }
         }
+    }
+}
+
+/* the first `lit` lanes of a coefficient's real and imaginary parts, `terms` apart */
+static void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
+    ROLLED for (int n = 0; n < lit; ++n) {
+        to[n] = ((const REAL *)&re)[n];
+        to[terms + n] = ((const REAL *)&im)[n];
     }
 }
 
@@ -149,55 +204,18 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *cosine
     const int lit = min(LANES, terms - first);
 
     for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
-        __global const VECTOR *column = narrow + 2L * phi * axis.n;
-        for (int n2 = 0; n2 < axis.n2; ++n2) {
-            VECTOR sum_re[MOST_PAIRS], sum_im[MOST_PAIRS], difference_re[MOST_PAIRS], difference_im[MOST_PAIRS];
-            pair(column + 2 * n2, 2 * axis.n2, axis, sum_re, difference_re);
-            pair(column + 2 * n2 + 1, 2 * axis.n2, axis, sum_im, difference_im);
-            for (int k = 0; k < axis.pairs; k += STEP_Y) {
-                VECTOR re_c[STEP_Y], im_c[STEP_Y], re_s[STEP_Y], im_s[STEP_Y];
-                UNROLL for (int j = 0; j < STEP_Y; ++j) re_c[j] = im_c[j] = re_s[j] = im_s[j] = 0;
-                for (int n1 = 0; n1 < axis.pairs; ++n1)
-                    UNROLL for (int j = 0; j < STEP_Y; ++j) {
-                        const VECTOR c = cosine[n1 * axis.padded + k + j], s = sine[n1 * axis.padded + k + j];
-                        re_c[j] = fma(c, sum_re[n1], re_c[j]);
-                        im_c[j] = fma(c, sum_im[n1], im_c[j]);
-                        re_s[j] = fma(s, difference_re[n1], re_s[j]);
-                        im_s[j] = fma(s, difference_im[n1], im_s[j]);
-                    }
-                UNROLL for (int j = 0; j < STEP_Y; ++j) {
-                    const int k1 = k + j;
-                    if (k1 < axis.pairs) {
-                        a[2 * (k1 * axis.n2 + n2)] = re_c[j] - im_s[j];
-                        a[2 * (k1 * axis.n2 + n2) + 1] = im_c[j] + re_s[j];
-                        if (k1 > 0 && 2 * k1 < axis.n1) {
-                            a[2 * ((axis.n1 - k1) * axis.n2 + n2)] = re_c[j] + im_s[j];
-                            a[2 * ((axis.n1 - k1) * axis.n2 + n2) + 1] = im_c[j] - re_s[j];
-                        }
-                    }
-                }
-            }
-        }
+        first_step(narrow + 2L * phi * axis.n, cosine, sine, axis, 2, STEP_Y, a);
         for (int b = 0; b < axis.blocks; ++b) {
-            VECTOR re[KEPT], im[KEPT];
-            frequencies(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, re, im);
-            UNROLL for (int q = 0; q < KEPT; ++q) {
+            VECTOR f[KEPT][2];
+            second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
+            ROLLED for (int q = 0; q < KEPT; ++q) {
                 const int row = place[b * KEPT + q];
                 if (row < 0) continue;
                 const long width = reach + phi_max + 1;
                 __global REAL *here = stack + ((row * width + reach + phi) * 2) * terms + first;
                 __global REAL *mirror = stack + (((rows - 1 - row) * width + reach - phi) * 2) * terms + first;
-                for (int n = 0; n < lit; ++n) {
-                    const REAL real = mean * ((const REAL *)&re[q])[n], imaginary = mean * ((const REAL *)&im[q])[n];
-                    if (phi <= phi_max) {
-                        here[n] = real;
-                        here[terms + n] = imaginary;
-                    }
-                    if (phi > 0 && phi <= reach) {
-                        mirror[n] = real;
-                        mirror[terms + n] = -imaginary;
-                    }
-                }
+                if (phi <= phi_max) store_terms(mean * f[q][0], mean * f[q][1], lit, terms, here);
+                if (phi > 0 && phi <= reach) store_terms(mean * f[q][0], -mean * f[q][1], lit, terms, mirror);
             }
         }
     }

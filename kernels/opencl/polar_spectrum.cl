@@ -6,26 +6,27 @@
  * With A the sum over even n and i B that over odd n, P(f) = A + i B; heights are real, so F_n(-f) is the conjugate
  * and |P(-f)| = |A - i B|: both half turns come from one gather.
  *
- *   stack    float[rows][columns][2][16 * BLOCKS]    F_n: real and imaginary parts, terms side by side
- *   decay    float[2 * REACH_X + 1], then [2 * REACH_Y + 1]   the window's transform at j spacings from its peak
+ *   stack    float[rows][columns][2][16 * blocks]    F_n: real and imaginary parts, terms side by side
+ *   decay    float[2 * reach_x + 1], then [2 * reach_y + 1]   the window's transform at j spacings from its peak
  *   radius   double[radii]                           r, 1/um
  *   azimuth  double[tiles][2][16]                    cos phi, then sin phi, of half a turn
- *   series   float[16 * BLOCKS][S_NODES]             (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last term
- *   spectrum float[2 * tiles][radii][S_NODES][16]    E: the tiles of the half turn, then those half a turn on;
+ *   series   float[16 * blocks][s_nodes]             (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last term
+ *   spectrum float[2 * tiles][radii][s_nodes][16]    E: the tiles of the half turn, then those half a turn on;
  *                                                    azimuths of a tile side by side
  *   fx_max, fy_max                                   the scan's band, 1/um: beyond it nothing is known and E = 0
  *
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
  * the point. One work-item, RADII radii and the sixteen azimuths of a tile.
  *
- * Set by the host: TERMS, even, in BLOCKS of 16, S_NODES and S_BLOCK of them, RADII, REACH_X and REACH_Y.
+ * Given at launch: terms, even, in so many `blocks` of 16; s_nodes, at least S_BLOCK; reach_x and reach_y. Set by the host: RADII;
+ * S_BLOCK, nodes whose sums stay in registers; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
-#define TAPS_X (2 * REACH_X + 1)
-#define TAPS_Y (2 * REACH_Y + 1)
-#define CELL (32 * BLOCKS)
+#define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
+#define INLINE __attribute__((always_inline))
+#define USUAL_TAPS 7  /* 2 reach_x + 1 of a patch of four sigma: these loops are written out, which saves a sixth */
 
 /* E is larger than caches: lines written past them need not be read first */
 #if defined(__has_builtin)
@@ -50,7 +51,7 @@ static void window_weights(const float16 d, const float df, const float inverse,
     const float16 peak = exp(-d * d * inverse), ratio = exp(2.0f * df * inverse * d), back = 1.0f / ratio;
     float16 up = peak, down = peak;
     weight[reach] = peak;
-    for (int j = 1; j <= reach; ++j) {
+    ROLLED for (int j = 1; j <= reach; ++j) {
         up *= ratio;
         down *= back;
         weight[reach + j] = up * decay[reach + j];
@@ -58,19 +59,21 @@ static void window_weights(const float16 d, const float df, const float inverse,
     }
 }
 
-/* F_n(f) of one block of 16 terms: the window along x, row by row, then along y */
-static void gather(__global const float *corner, const int columns, const float16 *along_x, const float *along_y,
-                   float16 *re, float16 *im) {
+/* F_n(f) of one block of 16 terms: the window along x, row by row, then along y; `cell` floats from cell to cell */
+static INLINE void gather(__global const float *corner, const int columns, const int cell, const int taps_x,
+                          const int taps_y, const float16 *along_x, const float16 *along_y, const int lane, float16 *re,
+                          float16 *im) {
     float16 sum_re = 0.0f, sum_im = 0.0f;
     /* written out as well, a wide window's rows would take the compiler minutes */
-    _Pragma("nounroll") for (int t = 0; t < TAPS_Y; ++t) {
-        __global const float *cell = corner + (long)t * columns * CELL;
+    ROLLED for (int t = 0; t < taps_y; ++t) {
+        __global const float *row = corner + (long)t * columns * cell;
         float16 row_re = 0.0f, row_im = 0.0f;
-        UNROLL for (int s = 0; s < TAPS_X; ++s) {
-            row_re = fma(along_x[s], vload16(0, cell + s * CELL), row_re);
-            row_im = fma(along_x[s], vload16(0, cell + s * CELL + 16 * BLOCKS), row_im);
+        UNROLL for (int s = 0; s < taps_x; ++s) {
+            const float16 weight = ((const float *)along_x)[16 * s + lane];
+            row_re = fma(weight, vload16(0, row + s * cell), row_re);
+            row_im = fma(weight, vload16(0, row + s * cell + cell / 2), row_im);
         }
-        const float16 weight = along_y[16 * t];
+        const float16 weight = ((const float *)along_y)[16 * t + lane];
         sum_re = fma(weight, row_re, sum_re);
         sum_im = fma(weight, row_im, sum_im);
     }
@@ -105,64 +108,66 @@ static void transpose(float16 *m) {
     }
 }
 
-/* Where the window lies for sixteen azimuths of a radius: its weights, its first cells; turned: the opposite of f is
- * gathered, for the stack holds the half plane fx >= 0; known: within the scan's band */
+/* Where the window lies for sixteen azimuths of a radius: its weights along x and y, its first column and row; turned:
+ * the opposite of f is gathered, for the stack holds the half plane fx >= 0; known: within the scan's band */
 typedef struct {
-    float16 along_x[TAPS_X], along_y[TAPS_Y];
-    int16 row, column, turned, known;
+    float16 weight[2][MOST_TAPS];
+    int16 first[2], turned, known;
 } Window;
 
 /* rint below 2^51, which PoCL works out in twenty operations: 1.5 * 2^52 leaves no digits for what follows the point */
 static double16 nearest(const double16 x) { return (x + 6755399441055744.0) - 6755399441055744.0; }
 
-static void place_window(const Grid grid, __global const float *decay, double16 fx, double16 fy, const double fx_max,
-                         const double fy_max, Window *window) {
-    const double16 turn = select((double16)1.0, (double16)-1.0, fx < 0.0);
-    fx *= turn;
-    fy *= turn;
-    const double16 x = nearest(fx * (1.0 / grid.dfx)), y = nearest(fy * (1.0 / grid.dfy));
-    window_weights(convert_float16(fx - x * grid.dfx), grid.dfx, grid.inverse_2_variance, decay, REACH_X, window->along_x);
-    window_weights(convert_float16(fy - y * grid.dfy), grid.dfy, grid.inverse_2_variance, decay + TAPS_X, REACH_Y, window->along_y);
-    window->row = convert_int16(y) - REACH_Y + grid.row_zero;
-    window->column = convert_int16(x) - REACH_X + grid.column_zero;
+static void place_window(const Grid grid, __global const float *decay, __global const double *azimuth, const double radius,
+                         const double fx_max, const double fy_max, const int reach_x, const int reach_y, Window *window) {
+    const double16 turn = select((double16)1.0, (double16)-1.0, radius * vload16(0, azimuth) < 0.0);
+    const int origin[2] = {grid.column_zero, grid.row_zero}, reach[2] = {reach_x, reach_y};
+    const double df[2] = {grid.dfx, grid.dfy}, f_max[2] = {fx_max, fy_max};
     window->turned = convert_int16(turn < 0.0);
-    window->known = convert_int16(fx <= fx_max && fabs(fy) <= fy_max);
+    window->known = -1;
+    ROLLED for (int axis = 0; axis < 2; ++axis, decay += 2 * reach_x + 1) {
+        const double16 f = turn * radius * vload16(axis, azimuth), cell = nearest(f * (1.0 / df[axis]));
+        window_weights(convert_float16(f - cell * df[axis]), df[axis], grid.inverse_2_variance, decay, reach[axis],
+                       window->weight[axis]);
+        window->first[axis] = convert_int16(cell) - reach[axis] + origin[axis];
+        window->known &= convert_int16(fabs(f) <= f_max[axis]);
+    }
 }
 
-/* F_n at one azimuth of a window, zero beyond the scan's band */
-static void gather_azimuth(__global const float *stack, const int columns, const Window *window, const int lane,
-                           float16 (*re)[16], float16 (*im)[16]) {
+/* F_n at one azimuth of a window, zero beyond the scan's band: [2][blocks][16 azimuths] */
+static void gather_azimuth(__global const float *stack, const int columns, const int blocks, const int taps_x,
+                           const int taps_y, const Window *window, const int lane, float16 *f_n) {
     if (!((const int *)&window->known)[lane]) {
-        for (int b = 0; b < BLOCKS; ++b) re[b][lane] = im[b][lane] = 0.0f;
+        ROLLED for (int b = 0; b < 2 * blocks; ++b) f_n[16 * b + lane] = 0.0f;
         return;
     }
-    const long first = (long)((const int *)&window->row)[lane] * columns + ((const int *)&window->column)[lane];
-    float16 along_x[TAPS_X];
-    UNROLL for (int s = 0; s < TAPS_X; ++s) along_x[s] = ((const float *)window->along_x)[16 * s + lane];
-    for (int b = 0; b < BLOCKS; ++b)
-        gather(stack + first * CELL + 16 * b, columns, along_x, (const float *)window->along_y + lane, &re[b][lane],
-               &im[b][lane]);
+    const int cell = 32 * blocks;
+    const long first = (long)((const int *)&window->first[1])[lane] * columns + ((const int *)&window->first[0])[lane];
+    ROLLED for (int b = 0; b < blocks; ++b) {
+        __global const float *corner = stack + first * cell + 16 * b;
+        float16 *re_b = f_n + 16 * b + lane, *im_b = re_b + 16 * blocks;
+        if (taps_x == USUAL_TAPS)
+            gather(corner, columns, cell, USUAL_TAPS, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
+        else
+            gather(corner, columns, cell, taps_x, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
+    }
 }
 
-/* E at a few nodes in s from F_n, azimuths side by side: at most S_BLOCK, a constant at either call, so that their sums
- * stay in registers */
-static __attribute__((always_inline)) void power_at_nodes(const float16 (*re)[16], const float16 (*im)[16], const int16 turned,
-                                                           const int nodes, __global const float *series,
-                                                           __global float *here, __global float *opposite) {
+/* E at S_BLOCK nodes in s from F_n, azimuths side by side: [terms], then those of the opposite azimuths */
+static void power_at_nodes(const float16 *re, const float16 *im, const int16 turned, const int terms, const int s_nodes,
+                           __global const float *series, __global float *here, __global float *opposite) {
     float16 even_re[S_BLOCK], even_im[S_BLOCK], odd_re[S_BLOCK], odd_im[S_BLOCK];
-    UNROLL for (int j = 0; j < nodes; ++j) even_re[j] = even_im[j] = odd_re[j] = odd_im[j] = 0.0f;
-    for (int b = 0; b < BLOCKS; ++b)
-        UNROLL for (int n = 0; n < 16; n += 2) {
-            __global const float *even = series + (16 * b + n) * S_NODES, *odd = even + S_NODES;
-            if (16 * b + n >= TERMS) break;
-            UNROLL for (int j = 0; j < nodes; ++j) {
-                even_re[j] = fma((float16)even[j], re[b][n], even_re[j]);
-                even_im[j] = fma((float16)even[j], im[b][n], even_im[j]);
-                odd_re[j] = fma((float16)odd[j], re[b][n + 1], odd_re[j]);
-                odd_im[j] = fma((float16)odd[j], im[b][n + 1], odd_im[j]);
-            }
+    UNROLL for (int j = 0; j < S_BLOCK; ++j) even_re[j] = even_im[j] = odd_re[j] = odd_im[j] = 0.0f;
+    ROLLED for (int n = 0; n < terms; n += 2) {
+        __global const float *even = series + n * s_nodes, *odd = even + s_nodes;
+        UNROLL for (int j = 0; j < S_BLOCK; ++j) {
+            even_re[j] = fma((float16)even[j], re[n], even_re[j]);
+            even_im[j] = fma((float16)even[j], im[n], even_im[j]);
+            odd_re[j] = fma((float16)odd[j], re[n + 1], odd_re[j]);
+            odd_im[j] = fma((float16)odd[j], im[n + 1], odd_im[j]);
         }
-    UNROLL for (int j = 0; j < nodes; ++j) {
+    }
+    UNROLL for (int j = 0; j < S_BLOCK; ++j) {
         const float16 plus_re = even_re[j] - odd_im[j], plus_im = even_im[j] + odd_re[j];
         const float16 minus_re = even_re[j] + odd_im[j], minus_im = even_im[j] - odd_re[j];
         const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
@@ -173,29 +178,30 @@ static __attribute__((always_inline)) void power_at_nodes(const float16 (*re)[16
 
 __kernel void polar_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
                              __global const double *radius, const int radii, __global const double *azimuth,
-                             __global const float *series, const double fx_max, const double fy_max,
-                             __global float *spectrum) {
+                             __global const float *series, const int terms, const int blocks, const int s_nodes,
+                             const int reach_x, const int reach_y, const double fx_max, const double fy_max, __global float *spectrum) {
     const int first = RADII * get_global_id(0), count = min(RADII, radii - first), tile = get_global_id(1);
-    __global float *here = spectrum + ((long)tile * radii + first) * 16 * S_NODES;
-    __global float *opposite = here + (long)get_global_size(1) * radii * 16 * S_NODES;
+    const int taps_x = 2 * reach_x + 1, taps_y = 2 * reach_y + 1;
+    __global float *here = spectrum + ((long)tile * radii + first) * 16 * s_nodes;
+    __global float *opposite = here + (long)get_global_size(1) * radii * 16 * s_nodes;
 
     Window window[RADII];
-    const double16 along_x = vload16(2 * tile, azimuth), along_y = vload16(2 * tile + 1, azimuth);
-    for (int i = 0; i < count; ++i)
-        place_window(grid, decay, radius[first + i] * along_x, radius[first + i] * along_y, fx_max, fy_max, window + i);
-    float16 re[RADII][BLOCKS][16], im[RADII][BLOCKS][16];
+    ROLLED for (int i = 0; i < count; ++i)
+        place_window(grid, decay, azimuth + 32 * tile, radius[first + i], fx_max, fy_max, reach_x, reach_y, window + i);
+    /* of every radius: real parts, then imaginary parts */
+    float16 f_n[RADII * 2 * MOST_BLOCKS * 16];
     /* radii inside: the next one's window lies in almost the same cells */
-    for (int lane = 0; lane < 16; ++lane)
-        for (int i = 0; i < count; ++i) gather_azimuth(stack, grid.columns, window + i, lane, re[i], im[i]);
-    for (int i = 0; i < count; ++i) {
-        for (int b = 0; b < BLOCKS; ++b) {
-            transpose(re[i][b]);
-            transpose(im[i][b]);
+    ROLLED for (int lane = 0; lane < 16; ++lane)
+        ROLLED for (int i = 0; i < count; ++i)
+            gather_azimuth(stack, grid.columns, blocks, taps_x, taps_y, window + i, lane, f_n + 32 * blocks * i);
+    ROLLED for (int part = 0; part < 2 * blocks * count; ++part) transpose(f_n + 16 * part);
+    ROLLED for (int i = 0; i < count; ++i) {
+        const float16 *re = f_n + 32 * blocks * i, *im = re + 16 * blocks;
+        ROLLED for (int s = 0; s < s_nodes; s += S_BLOCK) {
+            /* the last block begins earlier where nodes fill no whole one */
+            const int node = min(s, s_nodes - S_BLOCK);
+            const long place = 16 * ((long)i * s_nodes + node);
+            power_at_nodes(re, im, window[i].turned, terms, s_nodes, series + node, here + place, opposite + place);
         }
-        __global float *ahead = here + (long)i * 16 * S_NODES, *behind = opposite + (long)i * 16 * S_NODES;
-        const int whole = S_NODES - S_NODES % S_BLOCK;
-        for (int s = 0; s < whole; s += S_BLOCK)
-            power_at_nodes(re[i], im[i], window[i].turned, S_BLOCK, series + s, ahead + 16 * s, behind + 16 * s);
-        power_at_nodes(re[i], im[i], window[i].turned, S_NODES % S_BLOCK, series + whole, ahead + 16 * whole, behind + 16 * whole);
     }
 }

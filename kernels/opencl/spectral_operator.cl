@@ -16,11 +16,14 @@
  * that follow each other share G, as a group, at nodes w_m of its first ring; what I is at nodes of a ring's own follows
  * from the polynomial through these.
  *
- * Set by the host: ORDER (even); S_NODES; W_TERMS, a multiple of W_BLOCK, and W_BLOCK, 4 or 8; MOST_RINGS of a group.
+ * Given at launch: s_nodes, and w_terms, a multiple of 4. Set by the host: ORDER (even); MOST_RINGS of a group;
+ * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps; W_BLOCK (4 or 8) and SHARE_BLOCK (1, 2 or 4), nodes
+ * of w whose sums stay in registers.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
+#define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
 #define CHUNK 24  /* points whose G waits in the nearest cache */
 
 typedef struct {
@@ -41,23 +44,24 @@ static double node(__global const double *radius, const int i) { return i < 0 ? 
 
 /* Lagrange's polynomials on the ORDER nodes at `x`, at `at` */
 static void lagrange(const double *x, const double at, float *weight) {
-    double above[ORDER], below[ORDER];
-    for (int a = 0; a < ORDER; ++a) above[a] = below[a] = 1.0;
-    UNROLL for (int b = 0; b < ORDER; ++b)
-        UNROLL for (int a = 0; a < ORDER; ++a) {
-            above[a] *= a == b ? 1.0 : at - x[b];
-            below[a] *= a == b ? 1.0 : x[a] - x[b];
+    ROLLED for (int a = 0; a < ORDER; ++a) {
+        double above = 1.0, below = 1.0;
+        ROLLED for (int b = 0; b < ORDER; ++b) {
+            above *= a == b ? 1.0 : at - x[b];
+            below *= a == b ? 1.0 : x[a] - x[b];
         }
-    for (int a = 0; a < ORDER; ++a) weight[a] = above[a] / below[a];
+        weight[a] = above / below;
+    }
 }
 
 /* What one ring takes of each of its group's points. Wavelengths ascend, so the points about them descend. */
 static void share_points(const Group group, const Ring ring, const double stretch, __global const double *line,
                          __global const double *lambda, __global const float4 *weights,
-                         __global const float *reflectance, __global float *shares, __global int2 *span) {
+                         __global const float *reflectance, const int w_terms, __global float *shares,
+                         __global int2 *span) {
     const int about = group.on_nodes ? 1 : ORDER;
     int first = group.points - about;
-    for (int o = 0; o < group.points * 3 * W_TERMS; ++o) shares[o] = 0.0f;
+    for (int o = 0; o < group.points * 3 * w_terms; ++o) shares[o] = 0.0f;
     for (int l = 0; l < ring.count; ++l) {
         float weight[ORDER] = {1.0f};
         if (group.on_nodes)
@@ -72,11 +76,11 @@ static void share_points(const Group group, const Ring ring, const double stretc
         if (l == 0) span->y = first + about;
         const float4 xyz = weights[ring.nodes + l];
         const float channel[3] = {xyz.x, xyz.y, xyz.z};
-        __global const float *reflected = reflectance + (long)(ring.reflected + l) * W_TERMS;
+        __global const float *reflected = reflectance + (long)(ring.reflected + l) * w_terms;
         for (int a = 0; a < about; ++a)
             for (int c = 0; c < 3; ++c)
-                for (int m = 0; m < W_TERMS; m += 4) {
-                    __global float *share = shares + ((first + a) * 3 + c) * W_TERMS + m;
+                for (int m = 0; m < w_terms; m += 4) {
+                    __global float *share = shares + ((first + a) * 3 + c) * w_terms + m;
                     vstore4(fma((float4)(channel[c] * weight[a]), vload4(0, reflected + m), vload4(0, share)), 0, share);
                 }
     }
@@ -91,13 +95,13 @@ static void share_points(const Group group, const Ring ring, const double stretc
  *   stretch   double[rings]          t, of the ring over its group's first
  *   kappa     double[points]         ascending in each group, 1/um
  *   lambda    double[], weights float4[]    um; X, Y, Z: the nodes of every ring's quadrature
- *   reflectance  float[...][W_TERMS] of the material at each wavelength of a ring and each of its group's nodes of w;
+ *   reflectance  float[...][w_terms] of the material at each wavelength of a ring and each of its group's nodes of w;
  *                                    1 outside metals
- *   cardinal  float[S_NODES][S_NODES]    C_j = sum_k cardinal[k][j] T_k
- *   w_node    float[W_TERMS]         nodes of w in [0, 1], shares of the first ring's w_max
+ *   cardinal  float[s_nodes][s_nodes]    C_j = sum_k cardinal[k][j] T_k
+ *   w_node    float[w_terms]         nodes of w in [0, 1], shares of the first ring's w_max
  *   along_r   float[points][ORDER]   L_a of a point between radii
- *   along_s   float[points][S_NODES][W_TERMS]   C_j at every node of w
- *   shares    float[points of its group, for every ring][3][W_TERMS]
+ *   along_s   float[points][s_nodes][w_terms]   C_j at every node of w
+ *   shares    float[points of its group, for every ring][3][w_terms]
  *   span      int2[rings]            the points of its group that a ring takes from, and the end of them
  */
 __kernel void build_operator(__global const Group *groups, __global const Ring *rings, __global const int *place,
@@ -105,7 +109,7 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
                              __global const double *kappa, __global const double *lambda,
                              __global const float4 *weights, __global const float *reflectance,
                              __global const float *cardinal, __global const float *w_node, const float s_max,
-                             __global float *along_r, __global float *along_s, __global float *shares,
+                             const int s_nodes, const int w_terms, __global float *along_r, __global float *along_s, __global float *shares,
                              __global int2 *span) {
     const Group group = groups[get_global_id(0)];
     const double from = rho[group.ring];
@@ -120,55 +124,74 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
             for (int a = 0; a < ORDER; ++a) along_r[p * ORDER + a] = weight[a];
         }
         const float scale = 2.0f * 2.0f * (float)M_PI * w_max * (float)kappa[p] / s_max;
-        for (int m = 0; m < W_TERMS; m += 4) {
+        for (int m = 0; m < w_terms; m += 4) {
             const float4 z = scale * vload4(0, w_node + m) - 1.0f;
-            float4 T[S_NODES];
+            float4 T[MOST_S_NODES];
             T[0] = 1.0f;
             T[1] = z;
-            for (int k = 2; k < S_NODES; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
-            for (int j = 0; j < S_NODES; ++j) {
+            for (int k = 2; k < s_nodes; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
+            for (int j = 0; j < s_nodes; ++j) {
                 float4 sum = 0.0f;
-                for (int k = 0; k < S_NODES; ++k) sum = fma((float4)cardinal[k * S_NODES + j], T[k], sum);
-                vstore4(sum, 0, along_s + ((long)p * S_NODES + j) * W_TERMS + m);
+                for (int k = 0; k < s_nodes; ++k) sum = fma((float4)cardinal[k * s_nodes + j], T[k], sum);
+                vstore4(sum, 0, along_s + ((long)p * s_nodes + j) * w_terms + m);
             }
         }
     }
     for (int i = group.ring; i < group.ring + group.rings; ++i)
         share_points(group, rings[i], stretch[i], kappa + group.first, lambda, weights, reflectance,
-                     shares + (long)rings[i].shares * 3 * W_TERMS, span + i);
+                     w_terms, shares + (long)rings[i].shares * 3 * w_terms, span + i);
 }
 
-/* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
+/* G of one point at BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
  * radii, from what was interpolated: OpenCL C asks for a function each. */
-#define ALONG_LINE(name, memory)                                                                                       \
+#define ALONG_LINE(name, memory, BLOCK)                                                                                \
     static void name(memory const float *here, memory const float *opposite, __global const float *along_s,            \
-                     float16 (*line)[2]) {                                                                             \
-        float16 sum[W_BLOCK][2];                                                                                       \
-        UNROLL for (int m = 0; m < W_BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                         \
-        for (int j = 0; j < S_NODES; ++j) {                                                                            \
+                     const int s_nodes, const int w_terms, float16 (*line)[2]) {                                       \
+        float16 sum[BLOCK][2];                                                                                         \
+        UNROLL for (int m = 0; m < BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                           \
+        for (int j = 0; j < s_nodes; ++j) {                                                                            \
             const float16 a = vload16(j, here), b = vload16(j, opposite);                                              \
-            UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                 \
-                const float16 c = along_s[j * W_TERMS + m];                                                            \
+            UNROLL for (int m = 0; m < BLOCK; ++m) {                                                                   \
+                const float16 c = along_s[j * w_terms + m];                                                            \
                 sum[m][0] = fma(c, a, sum[m][0]);                                                                      \
                 sum[m][1] = fma(c, b, sum[m][1]);                                                                      \
             }                                                                                                          \
         }                                                                                                              \
-        UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                     \
+        UNROLL for (int m = 0; m < BLOCK; ++m) {                                                                       \
             line[m][0] = sum[m][0];                                                                                    \
             line[m][1] = sum[m][1];                                                                                    \
         }                                                                                                              \
     }
-ALONG_LINE(along_line_on_radius, __global)
-ALONG_LINE(along_line_between_radii, __private)
+ALONG_LINE(block_on_radius, __global, W_BLOCK)
+ALONG_LINE(block_between_radii, __private, W_BLOCK)
+#if W_BLOCK == 8
+ALONG_LINE(half_block_on_radius, __global, 4)
+ALONG_LINE(half_block_between_radii, __private, 4)
+#endif
+
+/* G of one point at every node of w: whole blocks, and half a one where it is left over */
+#define ALL_BLOCKS(kind, here, opposite, weights, line)                                                                \
+    do {                                                                                                               \
+        int m = 0;                                                                                                     \
+        for (; m + W_BLOCK <= w_terms; m += W_BLOCK)                                                                   \
+            block_##kind(here, opposite, weights + m, s_nodes, w_terms, line + m);                                     \
+        HALF_BLOCK(kind, here, opposite, weights, line)                                                                \
+    } while (0)
+#if W_BLOCK == 8
+#define HALF_BLOCK(kind, here, opposite, weights, line)                                                                \
+    if (m < w_terms) half_block_##kind(here, opposite, weights + m, s_nodes, w_terms, line + m);
+#else
+#define HALF_BLOCK(kind, here, opposite, weights, line)
+#endif
 
 /* E of a point between ORDER radii, at every node in s, for both tiles */
 static void between_radii(__global const float *here, __global const float *opposite, const int first,
-                          __global const float *along_r, float *e_here, float *e_opposite) {
-    for (int j = 0; j < S_NODES; ++j) {
+                          __global const float *along_r, const int s_nodes, float *e_here, float *e_opposite) {
+    for (int j = 0; j < s_nodes; ++j) {
         float16 a = 0.0f, b = 0.0f;
         UNROLL for (int k = 0; k < ORDER; ++k) {
             const int i = first + k;
-            const long row = (long)abs(i) * S_NODES + j;
+            const long row = (long)abs(i) * s_nodes + j;
             const float16 weight = along_r[k];
             a = fma(weight, vload16(row, i < 0 ? opposite : here), a);
             b = fma(weight, vload16(row, i < 0 ? here : opposite), b);
@@ -178,90 +201,98 @@ static void between_radii(__global const float *here, __global const float *oppo
     }
 }
 
-/* What CHUNK points or fewer add to a ring's X, Y, Z at four nodes of w, for both tiles */
-static void add_shares(const float16 (*line)[W_TERMS][2], const int points, const int m, __global const float *shares,
-                       float16 (*sum)[W_TERMS][2]) {
-    float16 part[3][4][2];
-    UNROLL for (int q = 0; q < 24; ++q) part[q / 8][q / 2 % 4][q % 2] = sum[q / 8][m + q / 2 % 4][q % 2];
+/* What CHUNK points or fewer add to a ring's X, Y, Z at SHARE_BLOCK nodes of w from m on, for both tiles.
+ *
+ *   line    [points][w_terms][2]       G
+ *   sum     [3][w_terms][2]            the ring's
+ */
+static void add_shares(const float16 (*line)[2], const int points, const int m, const int w_terms,
+                       __global const float *shares, float16 (*sum)[2]) {
+    float16 part[3][SHARE_BLOCK][2];
+    UNROLL for (int c = 0; c < 3; ++c)
+        UNROLL for (int k = 0; k < SHARE_BLOCK; ++k)
+            UNROLL for (int tile = 0; tile < 2; ++tile) part[c][k][tile] = sum[c * w_terms + m + k][tile];
     for (int p = 0; p < points; ++p)
-        UNROLL for (int k = 0; k < 4; ++k) {
-            const float16 a = line[p][m + k][0], b = line[p][m + k][1];
+        UNROLL for (int k = 0; k < SHARE_BLOCK; ++k) {
+            const float16 a = line[p * w_terms + m + k][0], b = line[p * w_terms + m + k][1];
             UNROLL for (int c = 0; c < 3; ++c) {
-                const float16 share = shares[(p * 3 + c) * W_TERMS + m + k];
+                const float16 share = shares[(p * 3 + c) * w_terms + m + k];
                 part[c][k][0] = fma(share, a, part[c][k][0]);
                 part[c][k][1] = fma(share, b, part[c][k][1]);
             }
         }
-    UNROLL for (int q = 0; q < 24; ++q) sum[q / 8][m + q / 2 % 4][q % 2] = part[q / 8][q / 2 % 4][q % 2];
+    UNROLL for (int c = 0; c < 3; ++c)
+        UNROLL for (int k = 0; k < SHARE_BLOCK; ++k)
+            UNROLL for (int tile = 0; tile < 2; ++tile) sum[c * w_terms + m + k][tile] = part[c][k][tile];
 }
 
-/* G of some points of a group at every node of w, for both tiles */
+/* G of some points of a group at every node of w, for both tiles: [points][w_terms][2] */
 static void take_line(const Group group, const int from, const int to, __global const float *here,
                       __global const float *opposite, __global const int *place, __global const float *along_r,
-                      __global const float *along_s, float16 (*line)[W_TERMS][2]) {
-    for (int p = group.first + from; p < group.first + to; ++p, ++line) {
-        __global const float *weights = along_s + (long)p * S_NODES * W_TERMS;
+                      __global const float *along_s, const int s_nodes, const int w_terms, float16 (*line)[2]) {
+    for (int p = group.first + from; p < group.first + to; ++p, line += w_terms) {
+        __global const float *weights = along_s + (long)p * s_nodes * w_terms;
         if (group.on_radii) {
-            const long row = (long)place[p] * S_NODES * 16;
-            for (int m = 0; m < W_TERMS; m += W_BLOCK)
-                along_line_on_radius(here + row, opposite + row, weights + m, *line + m);
+            const long row = (long)place[p] * s_nodes * 16;
+            ALL_BLOCKS(on_radius, here + row, opposite + row, weights, line);
         } else {
-            float e_here[16 * S_NODES], e_opposite[16 * S_NODES];
-            between_radii(here, opposite, place[p], along_r + p * ORDER, e_here, e_opposite);
-            for (int m = 0; m < W_TERMS; m += W_BLOCK)
-                along_line_between_radii(e_here, e_opposite, weights + m, *line + m);
+            float e_here[16 * MOST_S_NODES], e_opposite[16 * MOST_S_NODES];
+            between_radii(here, opposite, place[p], along_r + p * ORDER, s_nodes, e_here, e_opposite);
+            ALL_BLOCKS(between_radii, e_here, e_opposite, weights, line);
         }
     }
 }
 
 /* A ring's Chebyshev terms over its own w, from values at its group's nodes */
-static void write_terms(const float16 (*sum)[W_TERMS][2], __global const float *w_series, const int tile, const int tiles,
-                        __global float *ring) {
-    for (int o = 0; o < 3 * W_TERMS; ++o) {
-        __global const float *series = w_series + o % W_TERMS * W_TERMS;
-        float16 a = 0.0f, b = 0.0f;
-        for (int m = 0; m < W_TERMS; ++m) {
-            a = fma((float16)series[m], sum[o / W_TERMS][m][0], a);
-            b = fma((float16)series[m], sum[o / W_TERMS][m][1], b);
+static void write_terms(const float16 (*sum)[2], __global const float *w_series, const int w_terms, const int tile,
+                        const int tiles, __global float *ring) {
+    for (int c = 0; c < 3; ++c)
+        for (int k = 0; k < w_terms; ++k) {
+            float16 a = 0.0f, b = 0.0f;
+            for (int m = 0; m < w_terms; ++m) {
+                a = fma((float16)w_series[k * w_terms + m], sum[c * w_terms + m][0], a);
+                b = fma((float16)w_series[k * w_terms + m], sum[c * w_terms + m][1], b);
+            }
+            vstore16(a, 2 * tiles * (c * w_terms + k) + tile, ring);
+            vstore16(b, 2 * tiles * (c * w_terms + k) + tile + tiles, ring);
         }
-        vstore16(a, 2 * tiles * o + tile, ring);
-        vstore16(b, 2 * tiles * o + tile + tiles, ring);
-    }
 }
 
 /* The table of one group of rings, at the sixteen azimuths of a tile and those half a turn on. One work-item, one group
  * and one tile of half a turn.
  *
- *   spectrum  float[2 * tiles][radii][S_NODES][16]   E, as polar_spectrum.cl writes it
- *   w_series  float[rings][W_TERMS][W_TERMS]         Chebyshev coefficients over a ring's w from values at its group's
+ *   spectrum  float[2 * tiles][radii][s_nodes][16]   E, as polar_spectrum.cl writes it
+ *   w_series  float[rings][w_terms][w_terms]         Chebyshev coefficients over a ring's w from values at its group's
  *                                                    nodes, [term][w node]
- *   table     float[rings][3][W_TERMS][16 * 2 * tiles]
+ *   table     float[rings][3][w_terms][16 * 2 * tiles]
  */
 __kernel void apply_operator(__global const float *spectrum, const int radii, __global const Group *groups,
                              __global const Ring *rings, __global const int *place, __global const float *along_r,
                              __global const float *along_s, __global const float *shares, __global const int2 *span,
-                             __global const float *w_series, __global float *table) {
+                             const int s_nodes, const int w_terms, __global const float *w_series,
+                             __global float *table) {
     const Group group = groups[get_global_id(0)];
     const int tile = get_global_id(1), tiles = get_global_size(1);
-    __global const float *here = spectrum + (long)tile * radii * S_NODES * 16;
-    __global const float *opposite = here + (long)tiles * radii * S_NODES * 16;
+    __global const float *here = spectrum + (long)tile * radii * s_nodes * 16;
+    __global const float *opposite = here + (long)tiles * radii * s_nodes * 16;
 
-    float16 sum[MOST_RINGS][3][W_TERMS][2];
-    for (int q = 0; q < group.rings * 6 * W_TERMS; ++q) ((float16 *)sum)[q] = 0.0f;
+    float16 sum[MOST_RINGS * 3 * MOST_W_TERMS][2], line[CHUNK * MOST_W_TERMS][2];
+    for (int q = 0; q < group.rings * 3 * w_terms; ++q) sum[q][0] = sum[q][1] = 0.0f;
     for (int from = 0; from < group.points; from += CHUNK) {
         const int to = min(from + CHUNK, group.points);
-        float16 line[CHUNK][W_TERMS][2];
-        take_line(group, from, to, here, opposite, place, along_r, along_s, line);
+        take_line(group, from, to, here, opposite, place, along_r, along_s, s_nodes, w_terms, line);
         for (int i = 0; i < group.rings; ++i) {
             const int2 taken = span[group.ring + i];
             const int first = max(from, taken.x), points = min(to, taken.y) - first;
-            __global const float *own = shares + (long)(rings[group.ring + i].shares + first) * 3 * W_TERMS;
+            __global const float *own = shares + (long)(rings[group.ring + i].shares + first) * 3 * w_terms;
             if (points > 0)
-                for (int m = 0; m < W_TERMS; m += 4) add_shares(line + first - from, points, m, own, sum[i]);
+                for (int m = 0; m < w_terms; m += SHARE_BLOCK)
+                    add_shares(line + (first - from) * w_terms, points, m, w_terms, own, sum + i * 3 * w_terms);
         }
     }
     for (int i = 0; i < group.rings; ++i) {
         const long ring = group.ring + i;
-        write_terms(sum[i], w_series + ring * W_TERMS * W_TERMS, tile, tiles, table + ring * 96 * W_TERMS * tiles);
+        write_terms(sum + i * 3 * w_terms, w_series + ring * w_terms * w_terms, w_terms, tile, tiles,
+                    table + ring * 96 * w_terms * tiles);
     }
 }

@@ -1,7 +1,12 @@
 """No device: told before any work, with the remedy. A device is found once a process, so each has its own."""
 
+from dataclasses import dataclass
+from unittest import mock
+
+import pyopencl
 import pytest
 
+from kernels import device
 from tests.cli.tool import Tool
 
 NO_DEVICE = {"DIFFRACT_BAKE_DEVICE": "nonsense"}
@@ -12,8 +17,9 @@ def test_without_a_device_nothing_is_begun(tool: Tool, command: str) -> None:
     result = tool.process(command, tool.config(), environment=NO_DEVICE)
     assert result.code == 5
     (line,) = result.errors
-    assert "no working OpenCL device named like 'nonsense' (from DIFFRACT_BAKE_DEVICE)" in line
-    assert "apt-get install pocl-opencl-icd" in line
+    assert "DIFFRACT_BAKE_DEVICE asks for 'nonsense', and none is named like 'nonsense'" in line
+    assert "unset it" in line
+    assert "install" not in line
     assert "Traceback" not in result.stderr
     assert tool.artifacts() == {}
     assert not tool.out.exists()
@@ -28,7 +34,7 @@ def test_doctor_without_a_device(tool: Tool) -> None:
     assert result.code == 5
     assert "works" in result.stdout
     assert len(result.errors) == 1
-    assert "pocl-opencl-icd" in result.errors[0]
+    assert "DIFFRACT_BAKE_DEVICE" in result.errors[0]
 
 
 def test_without_any_driver(tool: Tool) -> None:
@@ -38,6 +44,7 @@ def test_without_any_driver(tool: Tool) -> None:
     result = tool.process("doctor", environment={"OCL_ICD_VENDORS": str(drivers), "OPENCL_VENDOR_PATH": str(drivers)})
     assert result.code == 5
     assert "none is listed" in result.errors[0]
+    assert "apt-get install pocl-opencl-icd" in result.errors[0]
 
 
 def test_doctor(tool: Tool) -> None:
@@ -55,3 +62,40 @@ def test_doctor_for_machines(tool: Tool) -> None:
     used = tool("doctor").stdout.splitlines()[-1]
     assert any(not d["fault"] and d["device"] in used for d in told["devices"])
     assert told["versions"]["diffract-bake"]
+
+
+def test_errors_of_the_compiler_come_through() -> None:
+    broken = mock.patch.object(device, "source", return_value="__kernel void broken() { undeclared = 1; }")
+    with broken, pytest.raises(pyopencl.Error, match="undeclared"):
+        device.Program(("broken.cl",), {})
+
+
+@dataclass(frozen=True)
+class Listed:
+    """What the choice reads of a platform or a device."""
+
+    name: str
+    type: int = 0
+
+
+POCL, OTHER = Listed("Portable Computing Language"), Listed("Another maker's")
+
+
+@pytest.mark.parametrize(
+    ("platform", "kind", "wanted", "taken"),
+    [
+        (POCL, "CPU", "", True),
+        (POCL, "GPU", "", False),
+        (OTHER, "GPU", "", False),
+        (OTHER, "CPU", "", False),
+        (OTHER, "GPU", "fast", True),
+        (OTHER, "GPU", "maker", True),
+        (POCL, "CPU", "fast", True),
+        (POCL, "CPU", "slow", False),
+    ],
+)
+def test_pocls_cpu_is_the_default_and_others_must_be_named(
+    platform: Listed, kind: str, wanted: str, taken: bool
+) -> None:
+    listed = Listed("Fast Processor", getattr(pyopencl.device_type, kind))
+    assert device._is_asked_for(platform, listed, wanted) is taken

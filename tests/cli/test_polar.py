@@ -1,5 +1,6 @@
 """The polar layout through the command line: what is cached, what is reused, what is refused."""
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,20 @@ def polar(first: Tool, tmp_path: Path) -> Tool:
     folder = tmp_path / "copy"
     shutil.copytree(first.folder, folder)
     return Tool(folder, folder / "store")
+
+
+def test_a_bake_with_a_cold_kernel_cache_writes_progress_alone(tool: Tool) -> None:
+    """No compiler's warnings and no library's lines; and that kernels are compiled is said in the first run only."""
+    config, cold = write(tool), {"XDG_CACHE_HOME": str(tool.folder / "cache")}
+    told = "  compiling kernels for this processor, once ..."
+    result = tool.process("run", config, environment=cold)
+    assert result.code == 0, result.stderr
+    progress = r"small:|  \w+ +([\d.]+ s|cached)|  [\w ]+: \d+ % after \d+ s \.\.\.|" + re.escape(told)
+    assert [line for line in result.stderr.splitlines() if not re.fullmatch(progress, line)] == []
+    assert result.stderr.splitlines().count(told) == 1
+    again = tool.process("run", config, "--store", tool.folder / "another", environment=cold)
+    assert again.code == 0, again.stderr
+    assert told not in again.stderr
 
 
 def states(tool: Tool, path: Path) -> dict[str, str]:
