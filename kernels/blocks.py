@@ -12,8 +12,8 @@ from kernels import device
 
 # By the floats of a vector register. dft_stack: STEP_X and STEP_Y of the first step's k1, with sums of two and of
 # four vectors, and KEPT frequencies of the second step, with two. polar_spectrum: S_BLOCK nodes in s, with four, and
-# RADII neighbours, whose windows share most of what they read. spectral_operator: W_BLOCK nodes of w with two vectors,
-# and SHARE_BLOCK nodes of w with six.
+# RADII neighbours, whose windows share most of what they read. spectral_operator: W_BLOCK nodes of w with two
+# vectors, and SHARE_BLOCK nodes of w with six.
 _BY_WIDTH = {
     16: {"STEP_X": 10, "STEP_Y": 5, "KEPT": 10, "S_BLOCK": 4, "RADII": 8, "W_BLOCK": 8, "SHARE_BLOCK": 4},
     8: {"STEP_X": 3, "STEP_Y": 2, "KEPT": 3, "S_BLOCK": 1, "RADII": 8, "W_BLOCK": 4, "SHARE_BLOCK": 1},

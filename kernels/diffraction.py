@@ -10,6 +10,7 @@ from kernels import device
 
 LANES = 8  # doubles in one vector of the kernels
 _VECTOR_BYTES = 64  # a double8 or a float16
+TAPS_BOUND = 17  # coefficients under a window along an axis; more takes a program of its own, for four times as many
 _TILE = 4096  # nodes or directions in one launch: bounds memory and paces progress
 _GRID = np.dtype(
     [
@@ -26,15 +27,14 @@ _GRID = np.dtype(
 
 @dataclass(frozen=True)
 class DeviceStack:
-    """A DFT stack on the device, with the program constants that fit it.
-
-    `coefficients` is (rows, columns, 2, terms) as in pipeline.stack; see there for the other values.
-    """
+    """A DFT stack on the device, its terms padded to `blocks` whole vectors; other values as in pipeline.stack."""
 
     buffer: Any
     decay: Any
     grid: np.ndarray
-    constants: dict[str, int]
+    terms: int
+    blocks: int
+    reach: tuple[int, int]
     half_range_um: float
     band_per_um: tuple[float, float]
 
@@ -57,7 +57,6 @@ def upload_stack(
     blocks = -(-terms // lanes)
     inverse = 0.5 / sigma_f_per_um**2
     grid = np.array([(*spacing_per_um, inverse, columns, *zero, 0)], dtype=_GRID)
-    constants = {"TERMS": terms, "BLOCKS": blocks, "REACH_X": reach[0], "REACH_Y": reach[1]}
     offsets = [np.arange(-r, r + 1) * d for r, d in zip(reach, spacing_per_um, strict=True)]
     decay = np.exp(-(np.concatenate(offsets) ** 2) * inverse).astype(coefficients.dtype)
     if terms == blocks * lanes:
@@ -66,7 +65,7 @@ def upload_stack(
         padded = device.empty((rows, columns, 2, blocks * lanes), coefficients.dtype)
         padded[..., :terms], padded[..., terms:] = coefficients, 0.0
         buffer = device.shared(padded)
-    return DeviceStack(buffer, device.upload(decay), grid, constants, half_range_um, band_per_um)
+    return DeviceStack(buffer, device.upload(decay), grid, terms, blocks, reach, half_range_um, band_per_um)
 
 
 def taylor_table(
@@ -77,10 +76,10 @@ def taylor_table(
     `uv` (nodes, 2), `lambda_um` (L,), `weights` (L, 3). Every u must be >= 0: the stack holds that half plane and
     I_p(-u, -v) = (-1)^p I_p(u, v).
     """
-    powers = 2 * stack.constants["TERMS"] - 1
-    width = 2 * LANES * stack.constants["BLOCKS"]
-    program = device.program(("windowed_dft.cl", "taylor_table.cl"), stack.constants)
-    series = _taylor_series(lambda_um, stack.half_range_um, stack.constants)
+    powers, width = 2 * stack.terms - 1, 2 * LANES * stack.blocks
+    constants = {"BLOCKS": stack.blocks, "MOST_TAPS": device.bound(2 * max(stack.reach) + 1, TAPS_BOUND)}
+    program = device.program(("windowed_dft.cl", "taylor_table.cl"), constants)
+    series = _taylor_series(lambda_um, stack)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, fourth_column(weights)))
     tile = np.empty((_TILE, 3, width))
     result = device.result_buffer(tile.nbytes)
@@ -92,6 +91,7 @@ def taylor_table(
             stack.buffer,
             stack.decay,
             stack.grid,
+            *(np.int32(n) for n in (stack.terms, *stack.reach)),
             nodes,
             np.int32(first),
             *spectrum,
@@ -129,14 +129,14 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
     return device.download(result, out)[:, : len(lambda_um)]
 
 
-def _taylor_series(lambda_um: np.ndarray, half_range_um: float, constants: dict[str, int]) -> np.ndarray:
+def _taylor_series(lambda_um: np.ndarray, stack: DeviceStack) -> np.ndarray:
     """(i k H)^n / n! (L, 2, 8 BLOCKS): what multiplies F_n at each wavelength; zero beyond the last term."""
-    phase = 2.0 * np.pi / lambda_um[:, None] * half_range_um
-    n = np.arange(1, constants["TERMS"])
+    phase = 2.0 * np.pi / lambda_um[:, None] * stack.half_range_um
+    n = np.arange(1, stack.terms)
     factors = np.cumprod(np.concatenate([np.ones((len(lambda_um), 1), complex), 1j * phase / n], axis=1), axis=1)
-    series = np.zeros((len(lambda_um), 2, LANES * constants["BLOCKS"]))
-    series[:, 0, : constants["TERMS"]] = factors.real
-    series[:, 1, : constants["TERMS"]] = factors.imag
+    series = np.zeros((len(lambda_um), 2, LANES * stack.blocks))
+    series[:, 0, : stack.terms] = factors.real
+    series[:, 1, : stack.terms] = factors.imag
     return series
 
 

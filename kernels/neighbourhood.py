@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kernels import device
+from kernels.diffraction import TAPS_BOUND
 
 Weight = Literal["gaussian", "sinc"]
 _LANES = 8  # doubles in one vector of the kernel
@@ -24,12 +25,13 @@ _GRID = np.dtype(
 
 @dataclass(frozen=True)
 class DeviceTerms:
-    """DFT terms on the device, with the program constants that fit them."""
+    """DFT terms on the device, padded to `blocks` whole vectors, and the `reach` (x, y) of a neighbourhood."""
 
     buffer: Any
     extrema: Any
     grid: np.ndarray
-    constants: dict[str, int]
+    blocks: int
+    reach: tuple[int, int]
 
 
 def upload_terms(
@@ -54,8 +56,7 @@ def upload_terms(
     extrema[0, :, :terms], extrema[1, :, :terms] = least, span
     sigma = [sigma_f_per_um / d for d in spacing_per_um]
     grid = np.array([(spacing_per_um, sigma, columns, *zero, 0)], dtype=_GRID)
-    constants = {"BLOCKS": blocks, "REACH_X": reach[0], "REACH_Y": reach[1]}
-    return DeviceTerms(device.shared(padded), device.upload(extrema), grid, constants)
+    return DeviceTerms(device.shared(padded), device.upload(extrema), grid, blocks, reach)
 
 
 def power(terms: DeviceTerms, weight: Weight, fx: np.ndarray, fy: np.ndarray, phase: np.ndarray) -> np.ndarray:
@@ -63,7 +64,9 @@ def power(terms: DeviceTerms, weight: Weight, fx: np.ndarray, fy: np.ndarray, ph
 
     Every neighbourhood must lie within the terms uploaded.
     """
-    program = device.program(("neighbourhood.cl",), terms.constants)
+    constants = {"BLOCKS": terms.blocks, "MOST_TAPS": device.bound(2 * max(terms.reach) + 1, TAPS_BOUND)}
+    program = device.program(("neighbourhood.cl",), constants)
+    reach = [np.int32(n) for n in terms.reach]
     out = np.empty(len(phase))
     pairs = np.zeros((min(_TILE, len(phase)), 4))
     for first in range(0, len(phase), _TILE):
@@ -72,6 +75,6 @@ def power(terms: DeviceTerms, weight: Weight, fx: np.ndarray, fy: np.ndarray, ph
         for column, values in enumerate((fx, fy, phase)):
             pairs[:count, column] = values[tile]
         given, result = device.upload(pairs[:count]), device.result_buffer(8 * count)
-        program.launch(f"{weight}_power", (count,), terms.buffer, terms.extrema, terms.grid, given, result)
+        program.launch(f"{weight}_power", (count,), terms.buffer, terms.extrema, terms.grid, *reach, given, result)
         device.download(result, out[tile])
     return out

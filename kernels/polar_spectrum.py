@@ -3,11 +3,11 @@
 import numpy as np
 
 from kernels import blocks, device
-from kernels.diffraction import DeviceStack
+from kernels.diffraction import TAPS_BOUND, DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
 # what a work-item's memory is compiled for; more takes a program of its own, four times as large
-_BLOCKS_BOUND, _TAPS_BOUND = 4, 17
+_BLOCKS_BOUND = 4
 
 
 def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarray, series: np.ndarray) -> np.ndarray:
@@ -19,19 +19,17 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     terms, nodes = series.shape
     # i^n, n = 2 m or 2 m + 1: the kernel keeps even and odd terms apart, which leaves (-1)^m
     signs = (-1.0) ** (np.arange(terms) // 2)
-    term_blocks = stack.constants["BLOCKS"]
-    padded = np.zeros((LANES * term_blocks, nodes), np.float32)
+    padded = np.zeros((LANES * stack.blocks, nodes), np.float32)
     padded[:terms] = signs[:, None] * series
     tiles = azimuth_rad.reshape(-1, LANES)
     directions = np.stack([np.cos(tiles), np.sin(tiles)], axis=1)
-    reach = stack.constants["REACH_X"], stack.constants["REACH_Y"]
     sizes = blocks.chosen("RADII", "S_BLOCK")
     constants = {
         "RADII": sizes["RADII"],
         # a flat surface has fewer nodes than a block
         "S_BLOCK": sizes["S_BLOCK"] if nodes >= sizes["S_BLOCK"] else 1,
-        "MOST_BLOCKS": device.bound(term_blocks, _BLOCKS_BOUND),
-        "MOST_TAPS": device.bound(2 * max(reach) + 1, _TAPS_BOUND),
+        "MOST_BLOCKS": device.bound(stack.blocks, _BLOCKS_BOUND),
+        "MOST_TAPS": device.bound(2 * max(stack.reach) + 1, TAPS_BOUND),
     }
     program = device.program(("polar_spectrum.cl",), constants)
     radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))
@@ -47,7 +45,7 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
         np.int32(len(radius_per_um)),
         direction,
         terms_at_s,
-        *(np.int32(n) for n in (terms + terms % 2, term_blocks, nodes, *reach)),
+        *(np.int32(n) for n in (terms + terms % 2, stack.blocks, nodes, *stack.reach)),
         *(np.float64(f) for f in stack.band_per_um),
         result,
     )

@@ -2,7 +2,7 @@
  * and summed for every term, then the Taylor series.
  *
  *   P(f; s) = sum_n (s H)^n / n! F_n(f),   F_n(f) = sum_(i,j) weight_x(i) weight_y(j) D_n[j, i],   s = k w
- *   i = a - REACH .. a + REACH,  a = floor(f / df): the anchor of eq. 1.7, not the nearest coefficient
+ *   i = a - reach .. a + reach,  a = floor(f / df): the anchor of eq. 1.7, not the nearest coefficient
  *   D_n    the DFT of i^n t^n, t = h/H, over the number of samples; stored as (D - least) / range, eq. 1.1
  *
  *   terms    float[rows][columns][2][8 * BLOCKS]   normalised terms: real and imaginary parts, n side by side;
@@ -14,13 +14,11 @@
  * Stored numbers are float, all sums double: what is lost is what the normalisation lost. One work-item, one pair of
  * a direction and a wavelength, whose neighbourhood must lie within the stored terms.
  *
- * Set by the host: BLOCKS of 8 terms, REACH_X and REACH_Y.
+ * Given at launch: reach_x and reach_y. Set by the host: BLOCKS of 8 terms; MOST_TAPS, which bounds 2 reach + 1.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
-#define TAPS_X (2 * REACH_X + 1)
-#define TAPS_Y (2 * REACH_Y + 1)
 
 typedef struct {
     double dfx, dfy;          /* spacing of the DFT's frequencies, 1/um */
@@ -51,18 +49,19 @@ static double total(const double8 x) {
 
 /* |sum_n (s H)^n / n! F_n|^2 with the weights of both axes */
 static double taylor_power(__global const float *terms, __global const double *extrema, const Grid grid,
-                           const double4 pair, const double *along_x, const double *along_y) {
-    const int first_row = (int)floor(pair.y / grid.dfy) - REACH_Y + grid.row_zero;
-    const int first_column = (int)floor(pair.x / grid.dfx) - REACH_X + grid.column_zero;
+                           const int reach_x, const int reach_y, const double4 pair, const double *along_x,
+                           const double *along_y) {
+    const int first_row = (int)floor(pair.y / grid.dfy) - reach_y + grid.row_zero;
+    const int first_column = (int)floor(pair.x / grid.dfx) - reach_x + grid.column_zero;
     double8 re[BLOCKS], im[BLOCKS];
     for (int b = 0; b < BLOCKS; ++b) {
         re[b] = 0.0;
         im[b] = 0.0;
     }
     double weights = 0.0;
-    for (int t = 0; t < TAPS_Y; ++t) {
+    for (int t = 0; t <= 2 * reach_y; ++t) {
         __global const float *row = terms + ((long)(first_row + t) * grid.columns + first_column) * 16 * BLOCKS;
-        for (int s = 0; s < TAPS_X; ++s) {
+        for (int s = 0; s <= 2 * reach_x; ++s) {
             const double weight = along_x[s] * along_y[t];
             __global const float *cell = row + (long)s * 16 * BLOCKS;
             weights += weight;
@@ -89,20 +88,22 @@ static double taylor_power(__global const float *terms, __global const double *e
 
 /* Single 2014, alg. 3: the window's transform at the neighbours' distances */
 __kernel void gaussian_power(__global const float *terms, __global const double *extrema, const Grid grid,
-                             __global const double4 *pairs, __global double *power) {
+                             const int reach_x, const int reach_y, __global const double4 *pairs,
+                             __global double *power) {
     const double4 pair = pairs[get_global_id(0)];
-    double along_x[TAPS_X], along_y[TAPS_Y];
-    gaussian(pair.x / grid.dfx, grid.sigma_x, REACH_X, along_x);
-    gaussian(pair.y / grid.dfy, grid.sigma_y, REACH_Y, along_y);
-    power[get_global_id(0)] = taylor_power(terms, extrema, grid, pair, along_x, along_y);
+    double along_x[MOST_TAPS], along_y[MOST_TAPS];
+    gaussian(pair.x / grid.dfx, grid.sigma_x, reach_x, along_x);
+    gaussian(pair.y / grid.dfy, grid.sigma_y, reach_y, along_y);
+    power[get_global_id(0)] = taylor_power(terms, extrema, grid, reach_x, reach_y, pair, along_x, along_y);
 }
 
 /* Single 2014, 1.5.3: the transform of one patch between its DFT coefficients */
 __kernel void sinc_power(__global const float *terms, __global const double *extrema, const Grid grid,
-                         __global const double4 *pairs, __global double *power) {
+                         const int reach_x, const int reach_y, __global const double4 *pairs,
+                         __global double *power) {
     const double4 pair = pairs[get_global_id(0)];
-    double along_x[TAPS_X], along_y[TAPS_Y];
-    sinc(pair.x / grid.dfx, REACH_X, along_x);
-    sinc(pair.y / grid.dfy, REACH_Y, along_y);
-    power[get_global_id(0)] = taylor_power(terms, extrema, grid, pair, along_x, along_y);
+    double along_x[MOST_TAPS], along_y[MOST_TAPS];
+    sinc(pair.x / grid.dfx, reach_x, along_x);
+    sinc(pair.y / grid.dfy, reach_y, along_y);
+    power[get_global_id(0)] = taylor_power(terms, extrema, grid, reach_x, reach_y, pair, along_x, along_y);
 }

@@ -11,11 +11,12 @@
  *   table    double[nodes][3][16 * BLOCKS]          I_p, dimensionless, p = 0 .. 2 N, then zeros
  *   fx_max, fy_max                                  the scan's band, 1/um: beyond it nothing is known and nothing added
  *
- * TERMS = N + 1 and BLOCKS = ceil(TERMS / 8) are set by the host. One work-item, one node.
+ * Given at launch: terms = N + 1. Set by the host: BLOCKS = ceil(terms / 8), for x, y and z stay in registers. One
+ * work-item, one node.
  */
 
 __kernel void taylor_table(__global const double *stack, __global const double *decay, const Grid grid,
-                           __global const double2 *uv, const int first, __global const double *lambda, __global const double *series,
+                           const int terms, const int reach_x, const int reach_y, __global const double2 *uv, const int first, __global const double *lambda, __global const double *series,
                            __global const double4 *weights, const int wavelengths, const double fx_max,
                            const double fy_max, __global double *table) {
     const int node = first + get_global_id(0);
@@ -39,7 +40,7 @@ __kernel void taylor_table(__global const double *stack, __global const double *
         if (fabs(fx) > fx_max || fabs(fy) > fy_max) continue;
 
         double8 re[BLOCKS], im[BLOCKS];
-        windowed_dft(stack, decay, grid, fx, fy, re, im);
+        windowed_dft(stack, decay, grid, reach_x, reach_y, fx, fy, re, im);
 
         /* G_n = series_n F_n */
         __global const double *series_re = series + l * 16 * BLOCKS, *series_im = series_re + 8 * BLOCKS;
@@ -52,7 +53,7 @@ __kernel void taylor_table(__global const double *stack, __global const double *
         /* sum over n + m = p of G_n . G_m, eight p at a time: pairs n < m count twice */
         UNROLL for (int b = 0; b < 2 * BLOCKS; ++b) {
             double8 product = 0.0;
-            for (int n = max(0, 8 * (b - BLOCKS) + 1); n < min(TERMS, 4 * b); ++n) {
+            for (int n = max(0, 8 * (b - BLOCKS) + 1); n < min(terms, 4 * b); ++n) {
                 product = fma((double8)re_n[n], vload8(0, re_n + 8 * b - n), product);
                 product = fma((double8)im_n[n], vload8(0, im_n + 8 * b - n), product);
             }

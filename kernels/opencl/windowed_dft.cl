@@ -9,9 +9,10 @@
  *     row    psi = (row - row_zero) * dfy         column  phi = (column - column_zero) * dfx     1/um
  *     part   0 real, 1 imaginary                  n       term, zero beyond the last
  *
- *   decay[2 * REACH_X + 1], then [2 * REACH_Y + 1]   double: the window at j spacings from its peak
+ *   decay[2 * reach_x + 1], then [2 * reach_y + 1]   double: the window at j spacings from its peak
  *
- * Set by the host: BLOCKS, vectors of 8 terms; REACH_X and REACH_Y, coefficients taken on either side of the nearest.
+ * Given at launch: reach_x and reach_y, coefficients taken on either side of the nearest. Set by the host: BLOCKS,
+ * vectors of 8 terms; MOST_TAPS, which bounds 2 reach + 1.
  */
 
 #ifdef cl_khr_fp64
@@ -26,8 +27,6 @@ typedef struct {
     double inverse_2_variance;  /* 1 / (2 sigma_f^2), um^2 */
     int columns, row_zero, column_zero;
 } Grid;
-
-#define TAPS(REACH) (2 * (REACH) + 1)
 
 /* exp(-(d - j df)^2 / (2 sigma_f^2)), j = -reach .. reach, from e = exp(-d^2 / (2 sigma_f^2)), ratio = exp(d df / sigma_f^2)
  * and decay_j = exp(-(j df)^2 / (2 sigma_f^2)): one exponential for all coefficients of an axis. */
@@ -46,7 +45,8 @@ static void window_weights(const double e, const double ratio, __global const do
 
 /* F_n(fx, fy) for all terms, into re and im (BLOCKS vectors each). (fx, fy) must lie within the stack. */
 static void windowed_dft(__global const double *stack, __global const double *decay, const Grid grid,
-                         const double fx, const double fy, double8 *re, double8 *im) {
+                         const int reach_x, const int reach_y, const double fx, const double fy, double8 *re,
+                         double8 *im) {
     for (int b = 0; b < BLOCKS; ++b) {
         re[b] = 0.0;
         im[b] = 0.0;
@@ -55,14 +55,14 @@ static void windowed_dft(__global const double *stack, __global const double *de
     const double dx = fx - nearest_x * grid.dfx, dy = fy - nearest_y * grid.dfy;
     const double4 factors = exp((double4)(-dx * dx, 2.0 * dx * grid.dfx, -dy * dy, 2.0 * dy * grid.dfy) *
                                 grid.inverse_2_variance);
-    double along_x[TAPS(REACH_X)], along_y[TAPS(REACH_Y)];
-    window_weights(factors.x, factors.y, decay, REACH_X, along_x);
-    window_weights(factors.z, factors.w, decay + TAPS(REACH_X), REACH_Y, along_y);
+    double along_x[MOST_TAPS], along_y[MOST_TAPS];
+    window_weights(factors.x, factors.y, decay, reach_x, along_x);
+    window_weights(factors.z, factors.w, decay + 2 * reach_x + 1, reach_y, along_y);
 
-    for (int t = 0; t < TAPS(REACH_Y); ++t) {
-        const long row = (long)(nearest_y - REACH_Y + t + grid.row_zero) * grid.columns;
-        const long first = row + nearest_x - REACH_X + grid.column_zero;
-        for (int s = 0; s < TAPS(REACH_X); ++s) {
+    for (int t = 0; t <= 2 * reach_y; ++t) {
+        const long row = (long)(nearest_y - reach_y + t + grid.row_zero) * grid.columns;
+        const long first = row + nearest_x - reach_x + grid.column_zero;
+        for (int s = 0; s <= 2 * reach_x; ++s) {
             const double8 weight = along_x[s] * along_y[t];
             __global const double *cell = stack + (first + s) * 16 * BLOCKS;
             UNROLL for (int b = 0; b < BLOCKS; ++b) {
