@@ -28,10 +28,10 @@ def fft(values: Real) -> Complex:
         return np.asarray(scipy.fft(values))
 
 
-def rfft2(values: Real) -> Complex:
-    """The half spectrum (ny, nx // 2 + 1) of real values (ny, nx)."""
+def rfft2(values: Real, shape: tuple[int, int] | None = None) -> Complex:
+    """The half spectrum (ny, nx // 2 + 1) of real values (ny, nx), padded with zeros to a larger `shape` if given."""
     with _fftw():
-        return np.asarray(scipy.rfft2(values))
+        return np.asarray(scipy.rfft2(values, s=shape))
 
 
 def irfft2(spectrum: Complex, shape: tuple[int, int]) -> Real:

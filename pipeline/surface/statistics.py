@@ -251,10 +251,12 @@ def _candidates(spectrum: _Spectrum, highest_per_um: float) -> list[complex]:
     bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
     lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
     candidates: list[tuple[float, complex]] = []
-    transform = fourier.rfft2(spectrum.power)
+    # padded with zeros to sizes that transform fast
+    my, mx = (fft.next_fast_len(n, real=True) for n in spectrum.power.shape)
+    transform = fourier.rfft2(spectrum.power, (my, mx))
     while lowest < float(radius.max()):
         width_x, width_y = _extent(spectrum, complex(1.4 * lowest), _KERNEL, _KERNEL_BINS)
-        density = _smooth(spectrum, transform, width_x, width_y)
+        density = _smooth(spectrum, transform, (my, mx), width_x, width_y)
         peaks = allowed & (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
         peaks &= density == ndimage.maximum_filter(density, 3)
         # of a lobe narrower than the kernel this is all, of a wider one a part: let no weak one pass by
@@ -266,12 +268,18 @@ def _candidates(spectrum: _Spectrum, highest_per_um: float) -> list[complex]:
     return [frequency for _, frequency in candidates]
 
 
-def _smooth(spectrum: _Spectrum, transform: NDArray[np.complex128], width_x: float, width_y: float) -> Array:
-    """The power, whose real `transform` is given, convolved with a Gaussian of widths `width_x`, `width_y`, 1/um."""
-    my, mx = spectrum.power.shape
+def _smooth(
+    spectrum: _Spectrum, transform: NDArray[np.complex128], padded: tuple[int, int], width_x: float, width_y: float
+) -> Array:
+    """The power convolved with a Gaussian of widths `width_x`, `width_y`, 1/um.
+
+    transform: half spectrum of the power, `padded` with zeros to that shape (my, mx).
+    """
+    my, mx = padded
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
     gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * fft.fftfreq(my)) ** 2)
-    return fourier.irfft2(transform * gain_y[:, None] * gain_x, (my, mx))
+    rows, columns = spectrum.power.shape
+    return fourier.irfft2(transform * gain_y[:, None] * gain_x, padded)[:rows, :columns]
 
 
 def _near(

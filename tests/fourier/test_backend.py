@@ -13,7 +13,9 @@ from pipeline.surface import recipes, statistics
 from pipeline.surface.recipes import random, snakes
 
 PLAIN = SimpleNamespace(
-    fft=scipy.fft.fft, rfft2=scipy.fft.rfft2, irfft2=lambda spectrum, shape: scipy.fft.irfft2(spectrum, s=shape)
+    fft=scipy.fft.fft,
+    rfft2=lambda values, shape=None: scipy.fft.rfft2(values, s=shape),
+    irfft2=lambda spectrum, shape: scipy.fft.irfft2(spectrum, s=shape),
 )
 RECIPES = {
     "elaphe": Elaphe(kind="elaphe", size_um=12.0, pitch_um=0.09),
@@ -30,6 +32,8 @@ def test_transforms_are_scipys(shape: tuple[int, int]) -> None:
     half = scipy.fft.rfft2(values)
     np.testing.assert_allclose(backend.fft(values[0]), scipy.fft.fft(values[0]), atol=1e-13)
     np.testing.assert_allclose(backend.rfft2(values), half, atol=1e-12)
+    larger = (shape[0] + 3, shape[1] + 2)
+    np.testing.assert_allclose(backend.rfft2(values, larger), scipy.fft.rfft2(values, s=larger), atol=1e-12)
     np.testing.assert_allclose(backend.irfft2(half, shape), values, atol=1e-14)
     # what was given stays as it was
     np.testing.assert_array_equal(values, kept)
