@@ -92,7 +92,7 @@ def build(
 
 def _taylor(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
     """The transforms of t^n, by FFTW."""
-    t = np.fft.ifftshift(field.heights_um) * _scale(field)
+    t = np.fft.ifftshift(field.heights_um) * scale_per_um(field)
     term_transforms.transform(_powers(t), kept, out, progress)
 
 
@@ -107,10 +107,12 @@ def _powers(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
 def _chebyshev(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
     """The transforms of T_n(t), by a kernel. Raises DeviceError where no device works."""
     require_device()
-    dft_stack.transform(field.heights_um, _scale(field), "chebyshev", kept, out, lambda done: progress("stack", done))
+    dft_stack.transform(
+        field.heights_um, scale_per_um(field), "chebyshev", kept, out, lambda done: progress("stack", done)
+    )
 
 
-def _scale(field: HeightField) -> float:
+def scale_per_um(field: HeightField) -> float:
     """1 / H of a centred field, 1/um; of a flat one, whose t is 0, anything."""
     return 1.0 / field.half_range_um if field.half_range_um > 0 else 1.0
 
