@@ -37,8 +37,9 @@ def bench_command(
     """Time CONFIGs' surfaces here, error against seconds and bytes.
 
     The paper's tables over their parameters, the polar table over its own, the same polar table by FINUFFT and both
-    in plain numpy, each with its mean CIELAB error at 7500 RU; and the stages' shares of the device's peak and
-    bandwidth, which are measured in the same run. Without CONFIGs: three synthetic surfaces.
+    in plain numpy, each with its mean CIELAB error at 7500 RU; the stages' shares of the device's peak and
+    bandwidth, which are measured in the same run; and the stack's transforms by the kernel, pyFFTW and scipy.
+    Without CONFIGs: three synthetic surfaces.
     """
     from pipeline.bench import criteria, files, machine
     from pipeline.store import writing
@@ -197,8 +198,21 @@ def _tell_surface(surface: Any, machine: Any) -> None:
             for reached in (share(timed, machine) for timed in surface.timed)
         ],
     )
+    click.echo("")
+    console.print_table(
+        ["the stack's transforms", "kernel", "pyFFTW", "", "differs", "scipy", "", "differs"],
+        [_transforms_row(of) for of in surface.transforms],
+    )
     for text in _remarks(surface):
         click.echo(text)
+
+
+def _transforms_row(of: Any) -> list[str]:
+    """Each route's time, its ratio to the kernel's, and its largest difference from the kernel's coefficients."""
+    row = [f"{of.terms} terms, {of.precision}", f"{1e3 * of.kernel_s:.0f} ms"]
+    for seconds, difference in ((of.fftw_s, of.fftw_difference), (of.scipy_s, of.scipy_difference)):
+        row += [f"{1e3 * seconds:.0f} ms", f"{seconds / of.kernel_s:.1f} x", f"{difference:.0e}"]
+    return row
 
 
 def _point_row(point: Any) -> list[str]:

@@ -4,7 +4,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-_LIBRARIES = ("numpy", "scipy", "pyopencl", "zarr", "OpenEXR", "colour-science")
+_LIBRARIES = ("numpy", "scipy", "pyFFTW", "pyopencl", "zarr", "OpenEXR", "colour-science")
 
 
 @cache

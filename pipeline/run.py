@@ -20,7 +20,7 @@ from pipeline.store import Artifact, Store
 from pipeline.working_device import require_device
 
 UNCHANGED = "nothing it reads has changed"
-_ON_DEVICE = {"stack", "spectrum", "table", "render", "validate"}
+_ON_DEVICE = {"spectrum", "table", "render", "validate"}
 
 
 def stages(config: Config) -> tuple[Stage, ...]:

@@ -6,6 +6,7 @@ Two series share one form, sum_n c_n(k w) t^n or T_n(t), t = h / H in [-1, 1]:
 - Chebyshev (Jacobi-Anger): terms T_n(t), c_n = (2 - [n = 0]) i^n J_n(k w H).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import floor
 from typing import Any, Literal
@@ -17,6 +18,7 @@ from scipy.fft import next_fast_len
 from kernels import device, dft_stack
 from kernels.dft_stack import Kept
 from pipeline.errors import AccuracyError
+from pipeline.fourier import term_transforms
 from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
@@ -67,7 +69,8 @@ def build(
     """The stack of `terms` terms for |f| <= `frequency_max_per_um` and the band, window cut at `tolerance`.
 
     Terms are made in float64 whatever `dtype` they are transformed and kept in. Raises AccuracyError where the stack
-    would not fit into memory, or the samples do not resolve the window; DeviceError where no device works.
+    would not fit into memory, or the samples do not resolve the window; DeviceError where a Chebyshev stack finds no
+    device that works.
     """
     _check_window(sigma_um, field.pitch_um)
     # centred after the crop: what is left may lie off the whole patch's mid-range
@@ -81,17 +84,37 @@ def build(
     )
     shape = (2 * psi_max + 1, phi_max + reach[0] + 1, 2, terms)
     _check_memory(shape, np.dtype(dtype).itemsize)
-    half_range = field.half_range_um
+    transform = _taylor if basis == "taylor" else _chebyshev
+    coefficients = device.empty(shape, dtype)
+    transform(field, Kept(psi_max, phi_max, reach[0]), coefficients, progress)
+    return Stack(basis, coefficients, terms, psi_max, reach[0], spacing, reach, field.half_range_um, sigma_um, band)
+
+
+def _taylor(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
+    """The transforms of t^n, by FFTW."""
+    t = np.fft.ifftshift(field.heights_um) * scale_per_um(field)
+    term_transforms.transform(_powers(t), kept, out, progress)
+
+
+def _powers(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """1, t, t^2, ... without end, each in the place of the one before."""
+    power = np.ones_like(t)
+    while True:
+        yield power
+        power *= t
+
+
+def _chebyshev(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
+    """The transforms of T_n(t), by a kernel. Raises DeviceError where no device works."""
     require_device()
-    coefficients = dft_stack.transform(
-        field.heights_um,
-        1.0 / half_range if half_range > 0 else 1.0,
-        basis,
-        Kept(psi_max, phi_max, reach[0]),
-        device.empty(shape, dtype),
-        lambda done: progress("stack", done),
+    dft_stack.transform(
+        field.heights_um, scale_per_um(field), "chebyshev", kept, out, lambda done: progress("stack", done)
     )
-    return Stack(basis, coefficients, terms, psi_max, reach[0], spacing, reach, half_range, sigma_um, band)
+
+
+def scale_per_um(field: HeightField) -> float:
+    """1 / H of a centred field, 1/um; of a flat one, whose t is 0, anything."""
+    return 1.0 / field.half_range_um if field.half_range_um > 0 else 1.0
 
 
 def _check_window(sigma_um: float, pitch_um: tuple[float, float]) -> None:

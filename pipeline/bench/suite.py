@@ -4,13 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.bench import memory, nufft, plain, polar_bake, setting
+from pipeline.bench import memory, nufft, plain, polar_bake, setting, transforms
 from pipeline.bench.machine import Timed
 from pipeline.bench.nufft import NufftRun
 from pipeline.bench.paper import RESOLUTION, STEP_NM, Paper, PaperTable
 from pipeline.bench.polar_bake import PolarBake, Stages
 from pipeline.bench.setting import Setting
 from pipeline.bench.timing import best_of, timed
+from pipeline.bench.transforms import Transforms
 from pipeline.bench.truth import MapTruth
 from pipeline.bundle import polar_storage
 from pipeline.bundle.polar_storage import Stored
@@ -135,6 +136,7 @@ class SurfaceBench:
     stages: Stages
     second_light_s: float | None
     timed: list[Timed]
+    transforms: list[Transforms]
     agreement: Agreement
     nufft_upsampling: float | None
     memory_bytes: int | None
@@ -181,6 +183,8 @@ class _Suite:
         self._polar(main, baked, routed, numpy_pair_s)
         self._textures(main, baked)
         self._paper()
+        measured = transforms.measure(main, effort.repeats)
+        self._progress("the stack's transforms", 1.0)
         return SurfaceBench(
             name=config.name,
             samples=field.shape,
@@ -193,6 +197,7 @@ class _Suite:
             stages=baked.stages,
             second_light_s=baked.second_light_s,
             timed=self._stages,
+            transforms=measured,
             agreement=Agreement(nufft_agrees, numpy_agrees),
             nufft_upsampling=routed.upsampling if routed else None,
             memory_bytes=memory.peak_bytes(field, config, MAIN) if effort.memory else None,

@@ -15,7 +15,7 @@ from pipeline.tables import grid
 
 _NOT_RECORDED = "not recorded"
 _LUMINOUS_NM = 550.0
-_LIBRARIES = ("numpy", "pyopencl", "zarr", "OpenEXR")
+_LIBRARIES = ("numpy", "pyFFTW", "pyopencl", "zarr", "OpenEXR")
 
 CONVENTIONS = {
     "directions": "unit vectors pointing away from the surface; z is its normal, x grows with the column",

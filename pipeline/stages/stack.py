@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from kernels import device
-from pipeline import arrays, digest, series
+from pipeline import arrays, series
 from pipeline import stack as dft_stack
 from pipeline.config import Config, TaylorLayout
 from pipeline.optics.spectra import trapezoid
@@ -27,7 +26,6 @@ def layout_of(config: Config) -> TaylorLayout:
 def _parameters(config: Config) -> dict[str, Any]:
     table = layout_of(config)
     return {
-        "kernel": digest.of_json(device.source("dft_stack.cl")),
         "spectrum": spectrum_parameters(config),
         "sigma_um": config.coherence.sigma_um,
         "terms": table.terms,
@@ -95,4 +93,4 @@ def load(artifact: Artifact) -> dft_stack.Stack:
     return dft_stack.Stack(coefficients=coefficients, terms=coefficients.shape[3], **found)
 
 
-STACK = Stage("stack", 2, ("surface",), _parameters, _produce)
+STACK = Stage("stack", 3, ("surface",), _parameters, _produce)

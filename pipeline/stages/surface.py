@@ -105,4 +105,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 2, (), _parameters, _produce)
+SURFACE = Stage("surface", 3, (), _parameters, _produce)

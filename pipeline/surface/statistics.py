@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
+from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 
 Array = NDArray[np.float64]
@@ -95,8 +96,8 @@ def _seam_energy(heights: Array) -> float:
     ny, nx = heights.shape
     turn_x, turn_y = (2.0 * np.pi * np.arange(n) / n for n in (nx, ny))
     # sources are two rows and two columns, whose transforms are those of lines
-    rows = fft.fft(heights[-1] - heights[0]) * (1.0 - np.exp(1j * turn_y))[:, None]
-    columns = fft.fft(heights[:, -1] - heights[:, 0])[:, None] * (1.0 - np.exp(1j * turn_x))
+    rows = fourier.fft(heights[-1] - heights[0]) * (1.0 - np.exp(1j * turn_y))[:, None]
+    columns = fourier.fft(heights[:, -1] - heights[:, 0])[:, None] * (1.0 - np.exp(1j * turn_x))
     waves = 2.0 * np.cos(turn_y)[:, None] + 2.0 * np.cos(turn_x)
     waves[0, 0] = np.inf  # the mean, relative to 4
     smooth = float(np.sum(np.abs((rows + columns) / (waves - 4.0)) ** 2)) / heights.size**2
@@ -217,7 +218,10 @@ def _spectrum(field: HeightField, highest_per_um: float) -> _Spectrum:
     variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
     x, fx = _ascending(nx, field.pitch_um[0], highest_per_um)
     y, fy = _ascending(ny, field.pitch_um[1], highest_per_um)
-    power = np.abs(fft.fft2(seen, workers=-1)[np.ix_(y, x)]) ** 2 / (seen.size * weight)
+    # the half spectrum of real samples holds the rest at the opposite frequency
+    opposite = x > nx // 2
+    rows, columns = np.where(opposite, -y[:, None], y[:, None]) % ny, np.where(opposite, nx - x, x)
+    power = np.abs(fourier.rfft2(seen)[rows, columns]) ** 2 / (seen.size * weight)
     size_x, size_y = field.size_um
     return _Spectrum(power, fx, fy, (1 / size_x, 1 / size_y), variance)
 
@@ -247,10 +251,12 @@ def _candidates(spectrum: _Spectrum, highest_per_um: float) -> list[complex]:
     bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
     lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
     candidates: list[tuple[float, complex]] = []
-    transform = fft.rfft2(spectrum.power, workers=-1)
+    # padded with zeros to sizes that transform fast
+    my, mx = (fft.next_fast_len(n, real=True) for n in spectrum.power.shape)
+    transform = fourier.rfft2(spectrum.power, (my, mx))
     while lowest < float(radius.max()):
         width_x, width_y = _extent(spectrum, complex(1.4 * lowest), _KERNEL, _KERNEL_BINS)
-        density = _smooth(spectrum, transform, width_x, width_y)
+        density = _smooth(spectrum, transform, (my, mx), width_x, width_y)
         peaks = allowed & (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
         peaks &= density == ndimage.maximum_filter(density, 3)
         # of a lobe narrower than the kernel this is all, of a wider one a part: let no weak one pass by
@@ -262,13 +268,18 @@ def _candidates(spectrum: _Spectrum, highest_per_um: float) -> list[complex]:
     return [frequency for _, frequency in candidates]
 
 
-def _smooth(spectrum: _Spectrum, transform: NDArray[np.complex128], width_x: float, width_y: float) -> Array:
-    """The power, whose real `transform` is given, convolved with a Gaussian of widths `width_x`, `width_y`, 1/um."""
-    my, mx = spectrum.power.shape
+def _smooth(
+    spectrum: _Spectrum, transform: NDArray[np.complex128], padded: tuple[int, int], width_x: float, width_y: float
+) -> Array:
+    """The power convolved with a Gaussian of widths `width_x`, `width_y`, 1/um.
+
+    transform: half spectrum of the power, `padded` with zeros to that shape (my, mx).
+    """
+    my, mx = padded
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
     gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * fft.fftfreq(my)) ** 2)
-    smooth: Array = fft.irfft2(transform * gain_y[:, None] * gain_x, s=(my, mx), workers=-1)
-    return smooth
+    rows, columns = spectrum.power.shape
+    return fourier.irfft2(transform * gain_y[:, None] * gain_x, padded)[:rows, :columns]
 
 
 def _near(

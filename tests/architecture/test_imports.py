@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("cli", "pipeline", "kernels")
 HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "OpenEXR", "PIL", "SurfaceTopography"}
-STAGE_FREE = ("tables", "stack.py", "reference.py", "validation.py", "optics", "series.py", "surface")
+STAGE_FREE = ("tables", "fourier", "stack.py", "reference.py", "validation.py", "optics", "series.py", "surface")
 
 
 def sources(*places):
@@ -80,6 +80,13 @@ def test_pipeline_knows_no_command_line():
 def test_only_the_device_module_talks_to_opencl():
     """One place opens devices and holds buffers."""
     assert set(offenders(ROOMS, "pyopencl")) == {"kernels/device.py"}
+
+
+def test_only_the_fourier_room_talks_to_fftw():
+    """One room plans transforms and keeps wisdom; the bench measures through it."""
+    found = offenders(ROOMS, "pyfftw")
+    assert found
+    assert {path.rpartition("/")[0] for path in found} == {"pipeline/fourier"}
 
 
 def test_physics_knows_no_stages():

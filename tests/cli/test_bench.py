@@ -38,6 +38,14 @@ def test_the_ways_agree(benched: tuple[Tool, Result]) -> None:
         assert surface["agreement"]["nufft"]["median"] < 1e-3
 
 
+def test_the_stacks_transforms_are_the_same_by_every_library(benched: tuple[Tool, Result]) -> None:
+    single, double = benched[1].json["surfaces"][0]["transforms"]
+    assert (single["precision"], double["precision"]) == ("single", "double")
+    for of, tolerance in ((single, 1e-6), (double, 1e-14)):
+        assert min(of[f"{route}_s"] for route in ("kernel", "fftw", "scipy")) > 0.0
+        assert max(of["fftw_difference"], of["scipy_difference"]) < tolerance
+
+
 def test_every_criterion_has_a_verdict(benched: tuple[Tool, Result]) -> None:
     criteria = benched[1].json["criteria"]
     assert {c["number"] for c in criteria} == {"1", "2", "3", "4", "5", "6"}
@@ -58,6 +66,8 @@ def test_a_tall_surface_has_no_paper_tables(tool: Tool) -> None:
     assert result.code == 0, result.stderr
     assert "no tables of the paper's" in result.stdout
     assert "polar table in plain numpy" in result.stdout
+    assert "terms, single" in result.stdout
+    assert "terms, double" in result.stdout
 
 
 def test_built_in_surfaces_are_sound() -> None:

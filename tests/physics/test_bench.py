@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kernels import device
-from pipeline.bench import machine, memory, nufft, plain, polar_bake, setting, work
+from pipeline.bench import machine, memory, nufft, plain, polar_bake, setting, transforms, work
 from pipeline.bench.criteria import Criterion
 from pipeline.bench.machine import Machine, Timed, Work
 from pipeline.bench.polar_bake import Stages
@@ -69,6 +69,18 @@ def test_nufft_gives_the_samples(case: Setting) -> None:
     assert error.percentile_99 < 0.05
     assert nufft.points_of(case) == routed.points
     assert routed.seconds(case) > routed.fixed_s > 0.0
+
+
+def test_the_stacks_transforms_agree(case: Setting) -> None:
+    """Kernel, FFTW and scipy on the same terms and frequencies, in both precisions."""
+    single, double = transforms.measure(case, 1)
+    assert (single.precision, double.precision) == ("single", "double")
+    assert single.terms == double.terms == case.plan.terms
+    assert 0.0 < max(single.fftw_difference, single.scipy_difference) < 1e-6
+    assert 0.0 < max(double.fftw_difference, double.scipy_difference) < 1e-14
+    assert min(single.kernel_s, single.fftw_s, single.scipy_s) > 0.0
+    built = case.stack()
+    assert transforms.kept_of(built).shape == built.coefficients.shape[:2]
 
 
 def test_of_two_bakes_the_better_times_count() -> None:

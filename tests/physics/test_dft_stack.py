@@ -1,50 +1,109 @@
-"""The stack's kernel against sums written out: every frequency, both series, sizes with and without small factors."""
+"""The stack's transforms by two routes, kernel and FFTW, against sums written out and against each other."""
 
 import numpy as np
 import pytest
 
-from kernels import device
-from kernels.dft_stack import Kept, transform
+from kernels import device, dft_stack
+from kernels.dft_stack import Kept
+from pipeline.fourier import term_transforms
+
+SIZES = pytest.mark.parametrize(
+    ("ny", "nx"), [(36, 30), (37, 41), (1, 64), (35, 1), (2, 3), (74, 53)], ids=lambda n: str(n)
+)
+PRECISIONS = pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 1e-6), (np.float64, 1e-14)])
+SERIES = pytest.mark.parametrize("series", ["chebyshev", "taylor"])
+SCALE_PER_UM = 1.0 / 0.3
 
 
 def silent(_done):
     """Nobody listens."""
 
 
+def heights_of(ny, nx):
+    return np.random.default_rng(ny + nx).uniform(-0.3, 0.3, (ny, nx))
+
+
+def kept_of(ny, nx):
+    """Frequencies beyond half the samples wrap; the reach may be wider than what is asked for."""
+    return Kept(psi_max=ny // 2 + 2, phi_max=nx // 2, reach=nx // 2 + 3)
+
+
+def terms_of(t, series, terms):
+    """T_n(t) or t^n, (terms, ny, nx)."""
+    n = np.arange(terms)[:, None, None]
+    return np.cos(n * np.arccos(np.clip(t, -1.0, 1.0))) if series == "chebyshev" else t**n
+
+
 def sums(heights, scale, series, kept, terms):
     """mean(term_n exp(+2 pi i f.x)) by matrices of waves, x and y from the middle sample: (psi, phi, terms)."""
-    t, n = scale * heights, np.arange(terms)[:, None, None]
-    term = np.cos(n * np.arccos(np.clip(t, -1.0, 1.0))) if series == "chebyshev" else t**n
     ny, nx = heights.shape
     psi = np.arange(-kept.psi_max, kept.psi_max + 1)
     phi = np.arange(-kept.reach, kept.phi_max + 1)
     along_y = np.exp(2j * np.pi / ny * np.outer(psi, np.arange(ny) - ny // 2))
     along_x = np.exp(2j * np.pi / nx * np.outer(phi, np.arange(nx) - nx // 2))
+    term = terms_of(scale * heights, series, terms)
     return np.einsum("py,nyx,qx->pqn", along_y, term, along_x, optimize=True) / heights.size
 
 
-@pytest.mark.parametrize(("ny", "nx"), [(36, 30), (37, 41), (1, 64), (35, 1), (2, 3), (74, 53)], ids=lambda n: str(n))
-@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 1e-6), (np.float64, 1e-14)])
-@pytest.mark.parametrize("series", ["chebyshev", "taylor"])
-def test_equals_the_sums_written_out(ny, nx, dtype, tolerance, series):
-    heights = np.random.default_rng(ny + nx).uniform(-0.3, 0.3, (ny, nx))
-    # frequencies beyond half the samples wrap; the reach may be wider than what is asked for
-    kept, terms = Kept(psi_max=ny // 2 + 2, phi_max=nx // 2, reach=nx // 2 + 3), 19
+def by_kernel(heights, scale, series, kept, terms, dtype, told=silent):
     out = device.empty((*kept.shape, 2, terms), dtype)
-    transform(heights, 1.0 / 0.3, series, kept, out, silent)
-    found = out[:, :, 0] + 1j * out[:, :, 1]
-    assert np.max(np.abs(found - sums(heights, 1.0 / 0.3, series, kept, terms))) < tolerance
+    dft_stack.transform(heights, scale, series, kept, out, told)
+    return out[:, :, 0] + 1j * out[:, :, 1]
+
+
+def by_fftw(heights, scale, series, kept, terms, dtype):
+    out = np.full((*kept.shape, 2, terms), np.nan, dtype)
+    t = scale * np.fft.ifftshift(heights)
+    term_transforms.transform(terms_of(t, series, terms), kept, out)
+    return out[:, :, 0] + 1j * out[:, :, 1]
+
+
+@SIZES
+@PRECISIONS
+@SERIES
+@pytest.mark.parametrize("route", [by_kernel, by_fftw])
+def test_equals_the_sums_written_out(route, ny, nx, dtype, tolerance, series):
+    heights, kept, terms = heights_of(ny, nx), kept_of(ny, nx), 19
+    found = route(heights, SCALE_PER_UM, series, kept, terms, dtype)
+    assert np.max(np.abs(found - sums(heights, SCALE_PER_UM, series, kept, terms))) < tolerance
+
+
+@pytest.mark.parametrize(("ny", "nx"), [(360, 288), (257, 331), (243, 500)], ids=lambda n: str(n))
+@PRECISIONS
+def test_the_kernel_and_fftw_agree(ny, nx, dtype, tolerance):
+    """Sizes at which sums take long: composite, prime, one of each oddness; a part of the band is kept."""
+    of = heights_of(ny, nx), SCALE_PER_UM, "chebyshev", Kept(psi_max=ny // 5, phi_max=nx // 6, reach=4), 33, dtype
+    difference = by_kernel(*of) - by_fftw(*of)
+    assert np.max(np.abs(difference)) < tolerance
 
 
 def test_two_hundred_terms_keep_their_digits():
     """Each vector of terms begins anew, at cos(n acos t): errors do not grow with n squared."""
     heights = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 24))
     heights[0, 0], heights[0, 1] = 1.0, -1.0
-    kept = Kept(2, 2, 1)
-    out = device.empty((*kept.shape, 2, 200), np.float64)
-    told = []
-    transform(heights, 1.0, "chebyshev", kept, out, told.append)
-    found = out[:, :, 0] + 1j * out[:, :, 1]
+    kept, told = Kept(2, 2, 1), []
+    found = by_kernel(heights, 1.0, "chebyshev", kept, 200, np.float64, told.append)
     assert np.max(np.abs(found - sums(heights, 1.0, "chebyshev", kept, 200))) < 1e-12
     assert told == sorted(told)
     assert told[-1] == 1.0
+
+
+@pytest.mark.parametrize("cores", [1, 3, 64, None])
+def test_terms_do_not_depend_on_how_many_are_transformed_at_once(monkeypatch, cores):
+    """Nor on a terms' array that is written over as soon as the next term is asked for."""
+    heights, kept, terms = heights_of(30, 28), Kept(7, 6, 3), 11
+    expected = by_fftw(heights, SCALE_PER_UM, "taylor", kept, terms, np.float64)
+    monkeypatch.setattr("os.cpu_count", lambda: cores)
+
+    def written_over():
+        term = np.empty(heights.shape)
+        for each in terms_of(SCALE_PER_UM * np.fft.ifftshift(heights), "taylor", terms):
+            term[...] = each
+            yield term
+            term[...] = np.nan
+
+    out, told = np.empty((*kept.shape, 2, terms)), []
+    term_transforms.transform(written_over(), kept, out, lambda stage, done: told.append((stage, done)))
+    np.testing.assert_array_equal(out[:, :, 0] + 1j * out[:, :, 1], expected)
+    assert told == sorted(told)
+    assert told[-1] == ("stack", 1.0)

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from pipeline.config import GaussianRandom, as_pair
+from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.patch import Axis, generator, patch_of
 
@@ -29,7 +30,7 @@ def smooth_noise(
     Correlation lengths above half an axis are cut to it, so that a small patch still varies.
     """
     lx, ly = (min(length, 0.5 * axis.size_um) for length, axis in zip(correlation_um, (x, y), strict=True))
-    white = fft.rfft2(rng.standard_normal((y.samples, x.samples)))
+    white = fourier.rfft2(rng.standard_normal((y.samples, x.samples)))
     white[0, 0] = 0.0
     noise = lowpass(white, y, x, (lx / np.sqrt(2), ly / np.sqrt(2)))
     rms = float(np.sqrt(np.mean(noise**2)))
@@ -46,5 +47,4 @@ def lowpass(
     fx = fft.rfftfreq(x.samples, x.pitch_um)
     fy = fft.fftfreq(y.samples, y.pitch_um)
     gain = np.exp(-((np.pi * length_um[1] * fy[:, None]) ** 2)) * np.exp(-((np.pi * length_um[0] * fx) ** 2))
-    field: NDArray[np.float64] = fft.irfft2(spectrum * gain, s=(y.samples, x.samples))
-    return field
+    return fourier.irfft2(spectrum * gain, (y.samples, x.samples))

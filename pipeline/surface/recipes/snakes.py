@@ -6,9 +6,9 @@ is exactly periodic; shapes were matched by eye and by power spectrum to AFM sca
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from pipeline.config import Elaphe, Xenopeltis
+from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.patch import Axis, Patch, generator, patch_of
 from pipeline.surface.recipes.random import lowpass, smooth_noise
@@ -104,7 +104,7 @@ def _unevenness(rng: np.random.Generator, patch: Patch, grain_um: tuple[float, f
 def _finish(height: Array, patch: Patch, height_um: float) -> HeightField:
     """Blurred by the tip, scaled to the peak-to-valley height asked for, um."""
     tip = [np.sqrt(2) * max(_TIP_UM, 0.4 * pitch) for pitch in patch.pitch_um]
-    height = lowpass(fft.rfft2(height), patch.y, patch.x, (tip[0], tip[1]))
+    height = lowpass(fourier.rfft2(height), patch.y, patch.x, (tip[0], tip[1]))
     low = float(height.min())
     span = float(height.max()) - low
     return HeightField((height - low) * (height_um / span), patch.pitch_um)

@@ -1,0 +1,104 @@
+"""The transforms of a series' terms by FFTW, of the frequencies kept alone.
+
+A real transform goes along x, then a complex one along y over the columns that are kept, so that the others cost
+nothing. Plans are FFTW_MEASURE's. Each serves one thread, and several terms are transformed at once: threads within a
+transform of this size wait for each other, take up to ten times as long to plan, and tie a plan to a number of cores.
+"""
+
+import os
+from collections import deque
+from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pyfftw
+from numpy.typing import NDArray
+
+from kernels.dft_stack import Kept
+from pipeline.fourier import wisdom
+from pipeline.progress import Progress, silent
+
+# of all arrays that plans work in
+_MOST_BYTES = 2**30
+
+
+class KeptPlaces:
+    """Where the frequencies kept stand in the half spectrum of real samples (ny, nx).
+
+    columns: how many columns of the half spectrum are read, from phi = 0 on.
+    """
+
+    def __init__(self, shape: tuple[int, int], kept: Kept) -> None:
+        ny, nx = shape
+        psi = np.arange(-kept.psi_max, kept.psi_max + 1)[:, None]
+        phi = np.arange(-kept.reach, kept.phi_max + 1) % nx
+        # the half spectrum holds the rest as conjugates at the opposite frequency
+        opposite = phi > nx // 2
+        self._row = np.where(opposite, -psi, psi) % ny
+        self._column = np.where(opposite, nx - phi, phi)
+        self._mean = 1.0 / (ny * nx)
+        # FFTW and scipy turn the other way than Stam: exp(-2 pi i f.x)
+        self._mean_imaginary = np.where(opposite, self._mean, -self._mean)
+        self.columns = int(self._column.max()) + 1
+
+    def put(self, spectrum: NDArray[Any], out: NDArray[Any]) -> None:
+        """Writes mean(term exp(+2 pi i f.x)) into `out` (psi, phi, 2) from `spectrum` (ny, `columns` or more)."""
+        found = spectrum[self._row, self._column]
+        out[:, :, 0] = self._mean * found.real
+        out[:, :, 1] = self._mean_imaginary * found.imag
+
+
+class _Workspace:
+    """Plans for one term at a time, and the arrays that they work in."""
+
+    def __init__(self, shape: tuple[int, int], places: KeptPlaces, real: np.dtype[Any]) -> None:
+        ny, nx = shape
+        complex_ = np.result_type(real, np.complex64)
+        self._places = places
+        self._samples = pyfftw.empty_aligned(shape, real)
+        half = pyfftw.empty_aligned((ny, nx // 2 + 1), complex_)
+        self._spectrum = pyfftw.empty_aligned((ny, places.columns), complex_)
+        measured = {"flags": ("FFTW_MEASURE",), "threads": 1}
+        self._along_x = pyfftw.FFTW(self._samples, half, axes=(1,), **measured)
+        self._along_y = pyfftw.FFTW(half[:, : places.columns], self._spectrum, axes=(0,), **measured)
+
+    @staticmethod
+    def bytes(shape: tuple[int, int], places: KeptPlaces, real: np.dtype[Any]) -> int:
+        ny, nx = shape
+        return ny * real.itemsize * (nx + 2 * (nx // 2 + 1) + 2 * places.columns)
+
+    def load(self, term: NDArray[Any]) -> None:
+        np.copyto(self._samples, term, casting="same_kind")
+
+    def transform(self, out: NDArray[Any]) -> None:
+        self._along_x.execute()
+        self._along_y.execute()
+        self._places.put(self._spectrum, out)
+
+
+def transform(terms: Iterable[NDArray[Any]], kept: Kept, out: NDArray[Any], progress: Progress = silent) -> None:
+    """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(term exp(+2 pi i f.x)) in its own precision.
+
+    terms: as many as `out` holds, each (ny, nx) with the origin of x and y at its first sample (np.fft.ifftshift puts
+    the middle sample there). A term is copied before the next is asked for, so one array may serve all of them.
+    """
+    count, left = out.shape[3], iter(terms)
+    first = next(left)
+    places = KeptPlaces(first.shape, kept)
+    room = _MOST_BYTES // _Workspace.bytes(first.shape, places, out.dtype)
+    with wisdom.planning():
+        at_once = max(1, min(os.cpu_count() or 1, count, room))
+        workspaces = [_Workspace(first.shape, places, out.dtype) for _ in range(at_once)]
+    running: deque[Future[None]] = deque()
+    with ThreadPoolExecutor(at_once) as threads:
+        for n in range(count):
+            if n >= at_once:
+                running.popleft().result()
+            workspace = workspaces[n % at_once]
+            workspace.load(first if n == 0 else next(left))
+            running.append(threads.submit(workspace.transform, out[..., n]))
+            progress("stack", n / count)
+        for each in running:
+            each.result()
+    progress("stack", 1.0)
