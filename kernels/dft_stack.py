@@ -1,9 +1,9 @@
-"""Host side of opencl/dft_stack.cl: the transforms of every term of a series, of the frequencies kept alone."""
+"""Host side of opencl/dft_stack.cl: the transforms of every Chebyshev term, of the frequencies kept alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, isqrt
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,12 +33,11 @@ class Kept:
 def transform(
     heights_um: NDArray[np.float64],
     scale_per_um: float,
-    series: Literal["chebyshev", "taylor"],
     kept: Kept,
     out: NDArray[Any],
     done: Callable[[float], None],
 ) -> NDArray[Any]:
-    """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(term_n(scale h) exp(+2 pi i f.x)).
+    """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(T_n(scale h) exp(+2 pi i f.x)).
 
     x and y count from the middle sample. `done` is told the share of terms that is made. Terms are made in double:
     a recurrence in single precision would lose n^2 of its digits at |t| = 1.
@@ -54,7 +53,6 @@ def transform(
         {
             "REAL": "float" if out.dtype == np.float32 else "double",
             "LANES": lanes,
-            "CHEBYSHEV": int(series == "chebyshev"),
             "MOST_PAIRS": _MOST_PAIRS,
             "MOST_STEP": max(sizes["STEP_X"], sizes["STEP_Y"]),
             **sizes,

@@ -107,9 +107,7 @@ def _powers(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
 def _chebyshev(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
     """The transforms of T_n(t), by a kernel. Raises DeviceError where no device works."""
     require_device()
-    dft_stack.transform(
-        field.heights_um, scale_per_um(field), "chebyshev", kept, out, lambda done: progress("stack", done)
-    )
+    dft_stack.transform(field.heights_um, scale_per_um(field), kept, out, lambda done: progress("stack", done))
 
 
 def scale_per_um(field: HeightField) -> float:

@@ -1,6 +1,6 @@
-/* DFT stack: F_n[psi, phi] = mean(term_n(h/H) exp(+2 pi i (phi x + psi y))), of the frequencies kept alone.
+/* DFT stack: F_n[psi, phi] = mean(T_n(h/H) exp(+2 pi i (phi x + psi y))), of the frequencies kept alone.
  *
- *   term_n = T_n (Chebyshev's) or t^n, t = h / H;  x and y count from the middle sample
+ *   T_n Chebyshev's polynomials, t = h / H;  x and y count from the middle sample
  *
  * Terms lie side by side in the lanes of one vector, so every sum is a sum of whole vectors and nothing is ever
  * transposed. A transform of N samples goes in two steps, N = N1 N2 (Cooley & Tukey 1965), each a small dense product:
@@ -16,7 +16,7 @@
  *   first_of       int[blocks]                   a block's k1
  *   place          int[blocks][KEPT]             where F[k] goes: its column or row; -1 for nothing
  *
- * Set by the host: REAL and its vectors of LANES; CHEBYSHEV 0 or 1; STEP_X and STEP_Y, at most MOST_STEP; KEPT;
+ * Set by the host: REAL and its vectors of LANES; STEP_X and STEP_Y, at most MOST_STEP; KEPT;
  * MOST_PAIRS, which bounds pairs. Work-items take rows or columns get_global_size(0) apart, each with `room` vectors of scratch of its own: they
  * outgrow the stacks of a driver's threads.
  */
@@ -51,16 +51,10 @@ static void chebyshev(const double8 t, const int first, double8 *term, double8 *
 /* terms first .. first + LANES - 1 of eight samples t, a vector each */
 static void terms_of(const double8 t, const int first, __global REAL *out) {
     double8 before, term;
-    if (CHEBYSHEV) {
-        chebyshev(t, first, &term, &before);
-    } else {
-        term = 1.0;
-        for (int n = 0; n < first; ++n) term *= t;
-        before = 0.0;
-    }
+    chebyshev(t, first, &term, &before);
     ROLLED for (int n = 0; n < LANES; ++n) {
         UNROLL for (int i = 0; i < 8; ++i) out[i * LANES + n] = ((const double *)&term)[i];
-        const double8 next = CHEBYSHEV ? 2.0 * t * term - before : t * term;
+        const double8 next = 2.0 * t * term - before;
         before = term;
         term = next;
     }
