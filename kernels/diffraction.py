@@ -10,8 +10,10 @@ from kernels import device
 
 LANES = 8  # doubles in one vector of the kernels
 _VECTOR_BYTES = 64  # a double8 or a float16
-TAPS_BOUND = 17  # coefficients under a window along an axis; more takes a program of its own, for four times as many
-_TILE = 4096  # nodes or directions in one launch: bounds memory and paces progress
+MOST_TAPS = 49  # coefficients under a window along an axis: 1e-12 on a patch of twenty sigma, all that a stack holds
+_TILE = 4096  # nodes in one launch: bounds memory and paces progress
+_WAVELENGTHS = 4  # that a work-item of the power spectrum takes at once
+_ITEMS_A_UNIT = 64  # work-items of the power spectrum for each compute unit: even shares, and little scratch
 _GRID = np.dtype(
     [
         ("dfx", np.float64),
@@ -52,6 +54,8 @@ def upload_stack(
 
     A float32 stack stays float32, and where its terms fill whole vectors it is shared with the device, not copied.
     """
+    if 2 * max(reach) + 1 > MOST_TAPS:
+        raise ValueError(f"a window of {2 * max(reach) + 1} coefficients: kernels hold {MOST_TAPS} at most")
     rows, columns, _, terms = coefficients.shape
     lanes = _VECTOR_BYTES // coefficients.itemsize
     blocks = -(-terms // lanes)
@@ -77,7 +81,7 @@ def taylor_table(
     I_p(-u, -v) = (-1)^p I_p(u, v).
     """
     powers, width = 2 * stack.terms - 1, 2 * LANES * stack.blocks
-    constants = {"BLOCKS": stack.blocks, "MOST_TAPS": device.bound(2 * max(stack.reach) + 1, TAPS_BOUND)}
+    constants = {"BLOCKS": stack.blocks, "MOST_TAPS": MOST_TAPS}
     program = device.program(("windowed_dft.cl", "taylor_table.cl"), constants)
     series = _taylor_series(lambda_um, stack)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, fourth_column(weights)))
@@ -102,31 +106,60 @@ def taylor_table(
         yield slice(first, first + count), device.download(result, tile)[:count, :, :powers]
 
 
+def line_order(uvw: np.ndarray) -> np.ndarray:
+    """Indices (directions,) that sort directions into lines of one v, u ascending, for `power_spectrum`.
+
+    `uvw` (directions, 3). Those with u < 0 stand where (-u, -v) does, from whose frequency they are served.
+    """
+    u, v = (_turn(uvw)[:, None] * uvw[:, :2]).T
+    return np.lexsort((u, v))
+
+
+def _turn(uvw: np.ndarray) -> np.ndarray:
+    """-1 where u < 0, else 1, (directions,): the stack holds the half plane u >= 0."""
+    return np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
+
+
+def _lines(uvw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions `uvw` (directions, 3) in lines: where each begins, the directions in order, where each came from.
+
+    As power_spectrum.cl's `first`, `directions` and `place`.
+    """
+    order, turn = line_order(uvw), _turn(uvw)[:, None]
+    directions = np.concatenate([turn * uvw[:, :2], uvw[:, 2:], turn], axis=1)[order]
+    begins = np.flatnonzero(np.diff(directions[:, 1], prepend=np.nan))
+    return np.append(begins, len(uvw)).astype(np.int32), directions, order.astype(np.int32)
+
+
 def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:
     """|P|^2 (directions, L) from a Chebyshev stack; NaN beyond the scan's band.
 
-    `uvw` (directions, 3), `lambda_um` (L,). One launch: callers choose how many directions they hold at once.
+    `uvw` (directions, 3), `lambda_um` (L,). Directions of equal v are cheaper together than apart: a map's rows, five
+    times. One launch: callers choose how many directions they hold at once, and hand over maps in `line_order`.
     """
-    program = device.program(("windowed_dft.cl", "power_spectrum.cl"), stack.constants)
-    groups = -(-len(lambda_um) // LANES)
-    padded = np.full(groups * LANES, lambda_um[-1])
-    padded[: len(lambda_um)] = lambda_um
-    directions, wavelengths = device.upload(fourth_column(uvw)), device.upload(padded)
-    out = np.empty((len(uvw), groups * LANES))
-    result = device.result_buffer(out.nbytes)
+    program = device.program(("power_spectrum.cl",), {"MOST_TAPS": MOST_TAPS})
+    first, directions, place = _lines(uvw)
+    lines, groups = len(first) - 1, -(-len(lambda_um) // _WAVELENGTHS)
+    padded = np.pad(lambda_um, (0, groups * _WAVELENGTHS - len(lambda_um)), mode="edge")
+    items = min(lines * groups, _ITEMS_A_UNIT * device.default_device().compute_units)
+    scratch = 16 * stack.blocks * (_WAVELENGTHS * (2 * stack.reach[0] + 1) + 12)
+    read = [device.upload(a) for a in (first, directions, place, padded)]
+    out = device.empty((len(uvw), groups * _WAVELENGTHS), np.float64)
+    result = device.shared(out)
     program.launch(
         "power_spectrum",
-        (len(uvw), groups),
+        (items,),
         stack.buffer,
         stack.decay,
         stack.grid,
-        directions,
-        wavelengths,
+        *(np.int32(n) for n in (stack.blocks, *stack.reach, lines, groups)),
+        *read,
         np.float64(stack.half_range_um),
         *(np.float64(f) for f in stack.band_per_um),
+        device.result_buffer(items * scratch * out.itemsize),
         result,
     )
-    return device.download(result, out)[:, : len(lambda_um)]
+    return device.settle(result, out)[:, : len(lambda_um)]
 
 
 def _taylor_series(lambda_um: np.ndarray, stack: DeviceStack) -> np.ndarray:

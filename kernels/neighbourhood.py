@@ -6,10 +6,10 @@ from typing import Any, Literal
 import numpy as np
 
 from kernels import device
-from kernels.diffraction import TAPS_BOUND
 
 Weight = Literal["gaussian", "sinc"]
 _LANES = 8  # doubles in one vector of the kernel
+_TAPS_BOUND = 17  # coefficients along an axis; more takes a program of its own, for four times as many
 _TILE = 2**18  # pairs in one launch: bounds memory
 _GRID = np.dtype(
     [
@@ -64,7 +64,7 @@ def power(terms: DeviceTerms, weight: Weight, fx: np.ndarray, fy: np.ndarray, ph
 
     Every neighbourhood must lie within the terms uploaded.
     """
-    constants = {"BLOCKS": terms.blocks, "MOST_TAPS": device.bound(2 * max(terms.reach) + 1, TAPS_BOUND)}
+    constants = {"BLOCKS": terms.blocks, "MOST_TAPS": device.bound(2 * max(terms.reach) + 1, _TAPS_BOUND)}
     program = device.program(("neighbourhood.cl",), constants)
     reach = [np.int32(n) for n in terms.reach]
     out = np.empty(len(phase))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from kernels import blocks, device
-from kernels.diffraction import TAPS_BOUND, DeviceStack
+from kernels.diffraction import MOST_TAPS, DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
 # what a work-item's memory is compiled for; more takes a program of its own, four times as large
@@ -29,7 +29,7 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
         # a flat surface has fewer nodes than a block
         "S_BLOCK": sizes["S_BLOCK"] if nodes >= sizes["S_BLOCK"] else 1,
         "MOST_BLOCKS": device.bound(stack.blocks, _BLOCKS_BOUND),
-        "MOST_TAPS": device.bound(2 * max(stack.reach) + 1, TAPS_BOUND),
+        "MOST_TAPS": MOST_TAPS,
     }
     program = device.program(("polar_spectrum.cl",), constants)
     radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))

@@ -65,7 +65,8 @@ class Map:
     radius: float = 1.0
 
     def _axes(self) -> tuple[Array, Array]:
-        centre = (np.arange(self.size) + 0.5) / self.size * 2.0 - 1.0
+        # in this order of steps opposite pixels are opposite to the last bit, so that one sum serves both
+        centre = (2.0 * np.arange(self.size) + 1.0 - self.size) / self.size
         x, y = np.meshgrid(centre, -centre)
         return x, y
 

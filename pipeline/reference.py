@@ -29,7 +29,7 @@ from pipeline.surface.heightfield import HeightField
 STEP_NM = FINE_STEP_NM
 # in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11, at half the time
 _TOLERANCE = 2e-11
-_DIRECTIONS_AT_ONCE = 2048
+_DIRECTIONS_AT_ONCE = 8192
 _ROWS_AT_ONCE = 32
 
 
@@ -84,11 +84,17 @@ def integrate(
     What lies beyond the scan's band (NaN) is unknown and adds nothing. A metal's reflectance is taken at every
     wavelength and half angle.
     """
-    known = np.nan_to_num(power) * brdf.window_area(material, quadrature, sigma_um)
     if material.fresnel == "conductor":
-        known = known * brdf.metal_reflectance(material, quadrature, geometry.cos_half(wi, wr))
-        return np.asarray(brdf.geometry_factor(material, wi, wr)[:, None] * (known @ quadrature.weights))
-    return np.asarray(brdf.direction_factor(material, quadrature, wi, wr)[:, None] * (known @ quadrature.weights))
+        power = power * brdf.metal_reflectance(material, quadrature, geometry.cos_half(wi, wr))
+        factor = brdf.geometry_factor(material, wi, wr)
+    else:
+        factor = brdf.direction_factor(material, quadrature, wi, wr)
+    weights = quadrature.weights * brdf.window_area(material, quadrature, sigma_um)[:, None]
+    sums = power @ weights
+    # few directions reach beyond the band: only theirs are summed a second time, without what is unknown
+    unknown = np.isnan(sums[:, 0])
+    sums[unknown] = np.nan_to_num(power[unknown]) @ weights
+    return np.asarray(factor[:, None] * sums)
 
 
 class Reference:
@@ -125,10 +131,12 @@ class Reference:
     ) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         quadrature = trapezoid(spectrum, step_nm)
-        out = np.empty((len(wr), 3))
+        uvw = geometry.uvw(wi, wr)
+        order, out = diffraction.line_order(uvw), np.empty((len(wr), 3))
         for tile in _tiles(len(wr)):
-            power = self.power(geometry.uvw(wi[tile], wr[tile]), quadrature.lambda_nm)
-            out[tile] = integrate(power, quadrature, material, self._sigma_um, wi[tile], wr[tile])
+            these = order[tile]
+            power = self.power(uvw[these], quadrature.lambda_nm)
+            out[these] = integrate(power, quadrature, material, self._sigma_um, wi[these], wr[these])
             progress("reference", tile.stop / len(wr))
         return out
 

@@ -60,9 +60,7 @@ def by_fftw(heights, scale, series, kept, terms, dtype):
 
 @SIZES
 @PRECISIONS
-@pytest.mark.parametrize(
-    ("route", "series"), [(by_kernel, "chebyshev"), (by_fftw, "chebyshev"), (by_fftw, "taylor")]
-)
+@pytest.mark.parametrize(("route", "series"), [(by_kernel, "chebyshev"), (by_fftw, "chebyshev"), (by_fftw, "taylor")])
 def test_equals_the_sums_written_out(route, ny, nx, dtype, tolerance, series):
     heights, kept, terms = heights_of(ny, nx), kept_of(ny, nx), 19
     found = route(heights, SCALE_PER_UM, series, kept, terms, dtype)

@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.config import LaserLine, Material, Spectrum
 from pipeline.errors import AccuracyError
+from pipeline.evaluate import Map
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.spectra import trapezoid
@@ -87,6 +88,53 @@ def test_fast_route_agrees_with_the_direct_sum(field: HeightField, sigma: float)
         direct = power_direct(field, sigma, uvw, nm)
         np.testing.assert_allclose(reference.power(uvw, np.array([nm]))[:, 0], direct, atol=1e-9)
         assert np.nanmax(direct) > 1e-4
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 35.0], ids=["normal light: opposite views share f", "oblique light"])
+def test_the_lines_of_a_map_agree_with_the_direct_sum(theta_deg: float) -> None:
+    """Views in rows of equal v, whose windows share columns, and some beyond the band: to 1e-9 of the mirror."""
+    field, nm = rough(48, 90, (0.23, 0.19), 0.15), np.array([390.0, 391.0, 500.0, 610.0, 780.0])
+    wr = Map(15).views()
+    uvw = geometry.uvw(np.broadcast_to(geometry.direction(np.radians(theta_deg), 0.3), wr.shape), wr)
+    direct = np.stack([power_direct(field, 2.0, uvw, one) for one in nm], axis=-1)
+    found = Reference(field, 2.0, 380.0).power(uvw, nm)
+    np.testing.assert_allclose(found, direct, atol=1e-9)
+    assert np.nanmax(direct) > 1e-3
+    assert 0.0 < np.mean(np.isnan(found)) < 0.5
+
+
+def test_what_a_direction_gets_does_not_depend_on_the_others() -> None:
+    """In any order, alone or among many of its line, twice over: the same to rounding."""
+    reference = Reference(rough(40, 56, (0.1, 0.1), 0.2), 1.5, 380.0)
+    rng, nm = np.random.default_rng(4), np.array([420.0, 555.0])
+    u, w = rng.uniform(-1.2, 1.2, 90), rng.choice([-1.7, -1.1, -0.4], 90)
+    uvw = np.stack([u, rng.choice([0.0, -0.31, 0.31, 0.9], 90), w], axis=-1)
+    uvw = np.concatenate([uvw, uvw[:20], -uvw[:20] * [1.0, 1.0, -1.0]])
+    together = reference.power(uvw, nm)
+    shuffled = rng.permutation(len(uvw))
+    np.testing.assert_allclose(reference.power(uvw[shuffled], nm), together[shuffled], rtol=1e-9, atol=1e-15)
+    alone = np.concatenate([reference.power(one[None], nm) for one in uvw])
+    np.testing.assert_allclose(together, alone, rtol=1e-9, atol=1e-15)
+
+
+def test_what_is_beyond_the_band_is_left_out_of_an_integral() -> None:
+    """XYZ of a direction whose short wavelengths are unknown is that of the others."""
+    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Spectrum(), Material()
+    wi, wr = np.array([[0.0, 0.0, 1.0]]), geometry.direction(np.array([np.radians(65.0)]), np.array([0.0]))
+    rule = trapezoid(light, 1.0)
+    power = Reference(field, 2.0, 380.0).power(geometry.uvw(wi, wr), rule.lambda_nm)
+    known = np.isfinite(power[0])
+    assert 0.2 < np.mean(known) < 0.8
+    expected = brdf.direction_factor(material, rule, wi, wr) * (power[0, known] @ rule.weights[known])
+    found = Reference(field, 2.0, 380.0).xyz(light, material, wi, wr)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-12)
+
+
+def test_opposite_views_of_a_map_are_opposite_to_the_last_bit() -> None:
+    """What lets one sum serve two views of a normal light."""
+    for size in (61, 300, 301):
+        views = Map(size).views()
+        np.testing.assert_array_equal(views[::-1], views * [-1.0, -1.0, 1.0])
 
 
 def test_what_the_window_does_not_see_changes_nothing() -> None:
