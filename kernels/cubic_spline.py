@@ -5,7 +5,7 @@ Layouts as stated in opencl/cubic_spline.cl.
 
 import numpy as np
 
-from kernels import device
+from kernels import device, programs
 from kernels.diffraction import fourth_column
 from kernels.polar_spectrum import LANES
 
@@ -13,7 +13,7 @@ from kernels.polar_spectrum import LANES
 def coefficients(table: np.ndarray) -> np.ndarray:
     """Cubic B-spline coefficients of a table (rings, outputs, azimuths) of samples, in its place."""
     rings, outputs, azimuths = table.shape
-    program = _program()
+    program = programs.polar()
     buffer = device.shared(table)
     program.launch("filter_azimuths", (outputs, rings), buffer, np.int32(azimuths))
     program.launch("filter_rings", (azimuths // (2 * LANES), outputs), buffer, np.int32(rings))
@@ -36,9 +36,5 @@ def look_up(table: np.ndarray, ring: np.ndarray, azimuth: np.ndarray, x: np.ndar
         device.result_buffer(out.nbytes),
     )
     sizes = np.int32(rings), np.int32(azimuths), np.int32(outputs // 3)
-    _program().launch("look_up", (len(ring),), device.lent(table), *sizes, cells, places, result)
+    programs.polar().launch("look_up", (len(ring),), device.lent(table), *sizes, cells, places, result)
     return device.download(result, out)[:, :3]
-
-
-def _program() -> device.Program:
-    return device.program(("cubic_spline.cl",), {})

@@ -61,6 +61,7 @@ class Probe:
     """One listed device and whether it works.
 
     vector_width: floats of a vector register that its compiler builds for. fault: empty where it works.
+    context: the one that it was tried in; PoCL loads its library of built-in functions anew for every context.
     """
 
     platform: str
@@ -70,7 +71,7 @@ class Probe:
     memory_bytes: int
     vector_width: int
     fault: str
-    handle: Any
+    context: Any
 
 
 @cache
@@ -147,10 +148,9 @@ def _listed() -> list[tuple[Any, Any]]:
 def _probe(platform: Any, device: Any) -> Probe:
     cl = _opencl()
     name, driver = device.name.strip(), f"{device.driver_version}, {device.version.strip()}"
-    fault, out = "", np.zeros(4)
+    fault, out, context = "", np.zeros(4), cl.Context([device])
     try:
         with _compiling(f"{driver} {name} {_PROBE}"):
-            context = cl.Context([device])
             queue = cl.CommandQueue(context)
             buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, out.nbytes)
             cl.Program(context, _PROBE).build(_OPTIONS).probe(queue, (4,), None, buffer)
@@ -161,7 +161,7 @@ def _probe(platform: Any, device: Any) -> Probe:
         fault = " ".join(str(error).split())[:200]
     width = int(out[0]) or device.native_vector_width_float
     units, memory = device.max_compute_units, device.global_mem_size
-    return Probe(platform.name, name, driver, units, memory, width, fault, device)
+    return Probe(platform.name, name, driver, units, memory, width, fault, context)
 
 
 @dataclass(frozen=True)
@@ -191,11 +191,10 @@ def default_device() -> Device:
     probes = [_probe(*pair) for pair in listed if _is_asked_for(*pair, wanted)]
     for probe in probes:
         if not probe.fault:
-            context = _opencl().Context([probe.handle])
-            queue = _opencl().CommandQueue(context)
+            queue = _opencl().CommandQueue(probe.context)
             width = min(16, max(4, probe.vector_width))
-            shares = bool(probe.handle.host_unified_memory)
-            return Device(probe.device, probe.driver, probe.compute_units, width, shares, context, queue)
+            shares = bool(queue.device.host_unified_memory)
+            return Device(probe.device, probe.driver, probe.compute_units, width, shares, probe.context, queue)
     tried = "; ".join(f"{probe.device}: {probe.fault}" for probe in probes)
     raise NoDeviceError(_why_none(wanted, [device.name.strip() for _, device in listed], tried))
 

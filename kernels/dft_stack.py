@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import blocks, device
+from kernels import blocks, device, programs
 
 _VECTOR_BYTES = 64
-_MOST_PAIRS = 128
 _ITEMS_A_UNIT = 4  # work-items, each with scratch that stays in a core's cache
 _AXIS = np.dtype([(name, np.int32) for name in ("n", "n1", "n2", "pairs", "padded", "blocks")])
 
@@ -48,16 +47,7 @@ def transform(
     sizes = blocks.chosen("STEP_X", "STEP_Y", "KEPT")
     x = _axis(nx, np.arange(columns), sizes["STEP_X"], sizes["KEPT"], out.dtype)
     y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), sizes["STEP_Y"], sizes["KEPT"], out.dtype)
-    program = device.program(
-        ("dft_stack.cl",),
-        {
-            "REAL": "float" if out.dtype == np.float32 else "double",
-            "LANES": lanes,
-            "MOST_PAIRS": _MOST_PAIRS,
-            "MOST_STEP": max(sizes["STEP_X"], sizes["STEP_Y"]),
-            **sizes,
-        },
-    )
+    program = programs.polar() if out.dtype == np.float32 else programs.exact()
     items, room = _ITEMS_A_UNIT * device.default_device().compute_units, max(3 * nx, 2 * ny)
     scratch = device.result_buffer(_VECTOR_BYTES * items * room), np.int64(room)
     between = device.empty((columns, ny, 2, lanes), out.dtype)
@@ -80,7 +70,7 @@ def transform(
 
 def _axis(n: int, frequencies: NDArray[np.int64], step: int, kept: int, dtype: Any) -> list[Any]:
     """The tables of one axis of n = n1 n2 samples, on the device, and its sizes."""
-    n1 = max(d for d in range(1, min(isqrt(n), 2 * _MOST_PAIRS - 2) + 1) if n % d == 0)
+    n1 = max(d for d in range(1, min(isqrt(n), 2 * programs.MOST_PAIRS - 2) + 1) if n % d == 0)
     n2, pairs = n // n1, n1 // 2 + 1
     padded = step * ceil(pairs / step)
     angle = 2.0 * np.pi * np.outer(np.arange(pairs), np.arange(padded)) / n1

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from kernels import device
+from kernels import device, programs
 
 LANES = 8  # doubles in one vector of the kernels
 _VECTOR_BYTES = 64  # a double8 or a float16
-MOST_TAPS = 49  # coefficients under a window along an axis: 1e-12 on a patch of twenty sigma, all that a stack holds
 _TILE = 4096  # nodes in one launch: bounds memory and paces progress
 _WAVELENGTHS = 4  # that a work-item of the power spectrum takes at once
 _ITEMS_A_UNIT = 64  # work-items of the power spectrum for each compute unit: even shares, and little scratch
@@ -54,8 +53,8 @@ def upload_stack(
 
     A float32 stack stays float32, and where its terms fill whole vectors it is shared with the device, not copied.
     """
-    if 2 * max(reach) + 1 > MOST_TAPS:
-        raise ValueError(f"a window of {2 * max(reach) + 1} coefficients: kernels hold {MOST_TAPS} at most")
+    if 2 * max(reach) + 1 > programs.MOST_TAPS:
+        raise ValueError(f"a window of {2 * max(reach) + 1} coefficients: kernels hold {programs.MOST_TAPS} at most")
     rows, columns, _, terms = coefficients.shape
     lanes = _VECTOR_BYTES // coefficients.itemsize
     blocks = -(-terms // lanes)
@@ -81,7 +80,7 @@ def taylor_table(
     I_p(-u, -v) = (-1)^p I_p(u, v).
     """
     powers, width = 2 * stack.terms - 1, 2 * LANES * stack.blocks
-    constants = {"BLOCKS": stack.blocks, "MOST_TAPS": MOST_TAPS}
+    constants = {"BLOCKS": stack.blocks, "MOST_TAPS": programs.MOST_TAPS}
     program = device.program(("windowed_dft.cl", "taylor_table.cl"), constants)
     series = _taylor_series(lambda_um, stack)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, fourth_column(weights)))
@@ -137,7 +136,7 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
     `uvw` (directions, 3), `lambda_um` (L,). Directions of equal v are cheaper together than apart: a map's rows, five
     times. One launch: callers choose how many directions they hold at once, and hand over maps in `line_order`.
     """
-    program = device.program(("power_spectrum.cl",), {"MOST_TAPS": MOST_TAPS})
+    program = programs.exact()
     first, directions, place = _lines(uvw)
     lines, groups = len(first) - 1, -(-len(lambda_um) // _WAVELENGTHS)
     padded = np.pad(lambda_um, (0, groups * _WAVELENGTHS - len(lambda_um)), mode="edge")

@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from kernels import blocks, device
-from kernels.diffraction import MOST_TAPS, DeviceStack
+from kernels import blocks, device, programs
+from kernels.diffraction import DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
-# what a work-item's memory is compiled for; more takes a program of its own, four times as large
-_BLOCKS_BOUND = 4
 
 
 def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarray, series: np.ndarray) -> np.ndarray:
@@ -17,23 +15,18 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     follows it in E, tile by tile. `series` (terms, s nodes) holds (2 - [n = 0]) J_n(s H).
     """
     terms, nodes = series.shape
+    sizes = blocks.chosen("RADII", "S_BLOCK")
+    # a flat surface has fewer nodes than a block
+    columns = max(nodes, sizes["S_BLOCK"])
     # i^n, n = 2 m or 2 m + 1: the kernel keeps even and odd terms apart, which leaves (-1)^m
     signs = (-1.0) ** (np.arange(terms) // 2)
-    padded = np.zeros((LANES * stack.blocks, nodes), np.float32)
-    padded[:terms] = signs[:, None] * series
+    padded = np.zeros((LANES * stack.blocks, columns), np.float32)
+    padded[:terms, :nodes] = signs[:, None] * series
     tiles = azimuth_rad.reshape(-1, LANES)
     directions = np.stack([np.cos(tiles), np.sin(tiles)], axis=1)
-    sizes = blocks.chosen("RADII", "S_BLOCK")
-    constants = {
-        "RADII": sizes["RADII"],
-        # a flat surface has fewer nodes than a block
-        "S_BLOCK": sizes["S_BLOCK"] if nodes >= sizes["S_BLOCK"] else 1,
-        "MOST_BLOCKS": device.bound(stack.blocks, _BLOCKS_BOUND),
-        "MOST_TAPS": MOST_TAPS,
-    }
-    program = device.program(("polar_spectrum.cl",), constants)
+    program = programs.polar(term_blocks=stack.blocks)
     radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))
-    out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
+    out = device.empty((2 * len(tiles), len(radius_per_um), columns, LANES), np.float32)
     result = device.shared(out)
     program.launch(
         "polar_spectrum",
@@ -45,8 +38,9 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
         np.int32(len(radius_per_um)),
         direction,
         terms_at_s,
-        *(np.int32(n) for n in (terms + terms % 2, stack.blocks, nodes, *stack.reach)),
+        *(np.int32(n) for n in (terms + terms % 2, stack.blocks, columns, *stack.reach)),
         *(np.float64(f) for f in stack.band_per_um),
         result,
     )
-    return device.settle(result, out)
+    found = device.settle(result, out)
+    return found if columns == nodes else np.ascontiguousarray(found[:, :, :nodes])

@@ -5,14 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from kernels import blocks, device
+from kernels import device, programs
 from kernels.diffraction import fourth_column
 from kernels.polar_spectrum import LANES
-
-ORDER = 8  # nodes of every interpolation, over r and along kappa
-MOST_RINGS = 8  # of a group, whose sums stay in the nearest cache
-# what a work-item's memory is compiled for; more takes a program of its own, four times as large
-_S_NODES_BOUND, _W_TERMS_BOUND = 64, 32
+from kernels.programs import ORDER
 
 
 @dataclass(frozen=True)
@@ -104,7 +100,7 @@ def _operator(
 ) -> tuple[device.Program, list[Any]]:
     """The program, and the operator of every group from E on `s_nodes`, on the device, in the kernels' order."""
     w_terms = reflectance.shape[1]
-    program = _program(s_nodes, w_terms)
+    program = programs.polar(s_nodes=s_nodes, w_terms=w_terms)
     where = [device.upload(a.astype(np.int32)) for a in (_groups(points), _rings(points, quadratures), points.place)]
     inputs = [
         device.upload(a)
@@ -126,17 +122,6 @@ def _operator(
     sizes = np.float32(s_max_per_um), np.int32(s_nodes), np.int32(w_terms)
     program.launch("build_operator", (len(points.rings),), *where, *inputs, *sizes, *weights)
     return program, [*where, *weights]
-
-
-def _program(s_nodes: int, w_terms: int) -> device.Program:
-    constants = {
-        "ORDER": ORDER,
-        "MOST_RINGS": MOST_RINGS,
-        "MOST_S_NODES": device.bound(s_nodes, _S_NODES_BOUND),
-        "MOST_W_TERMS": device.bound(w_terms, _W_TERMS_BOUND),
-        **blocks.chosen("W_BLOCK", "SHARE_BLOCK"),
-    }
-    return device.program(("spectral_operator.cl",), constants)
 
 
 def _groups(points: LinePoints) -> np.ndarray:

@@ -8,7 +8,7 @@ from math import log2
 
 import numpy as np
 
-from kernels.spectral_operator import ORDER
+from kernels.programs import ORDER
 from pipeline.bench.machine import Precision, Work
 from pipeline.bench.setting import Setting
 from pipeline.spectrum import PolarSpectrum

@@ -14,7 +14,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.spectral_operator import MOST_RINGS, ORDER, LinePoints, w_max
+from kernels.programs import MOST_RINGS, ORDER
+from kernels.spectral_operator import LinePoints, w_max
 from pipeline.optics.geometry import Array
 from pipeline.tables.quadrature import RingQuadratures
 

@@ -1,13 +1,17 @@
 """No device: told before any work, with the remedy. A device is found once a process, so each has its own."""
 
+import os
+import subprocess
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from unittest import mock
 
 import pyopencl
 import pytest
 
 from kernels import device
-from tests.cli.tool import Tool
+from tests.cli.tool import REPOSITORY, Tool
 
 NO_DEVICE = {"DIFFRACT_BAKE_DEVICE": "nonsense"}
 
@@ -99,3 +103,16 @@ def test_pocls_cpu_is_the_default_and_others_must_be_named(
 ) -> None:
     listed = Listed("Fast Processor", getattr(pyopencl.device_type, kind))
     assert device._is_asked_for(platform, listed, wanted) is taken
+
+
+def test_kernels_can_be_built_for_a_processor_without_avx512(tmp_path: Path) -> None:
+    """As `make test-avx2` asks for: blocks follow what the compiler builds for, not what the processor has."""
+    processor = Path("/proc/cpuinfo")
+    if not processor.exists() or "avx2" not in processor.read_text():
+        pytest.skip("this processor has no AVX2")
+    script = "from kernels import device; print(device.default_device().vector_width)"
+    avx2 = {"POCL_KERNELLIB_NAME": "avx2", "POCL_LLVM_CPU_NAME": "haswell", "XDG_CACHE_HOME": str(tmp_path)}
+    told = subprocess.run(
+        [sys.executable, "-c", script], env={**os.environ, **avx2}, cwd=REPOSITORY, capture_output=True, text=True
+    )
+    assert told.stdout == "8\n", told.stderr

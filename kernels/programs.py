@@ -1,0 +1,45 @@
+"""Which kernels are built together: a build costs the compiler a tenth of a second, whatever is in it."""
+
+from kernels import blocks, device
+
+# Bounds of what a work-item keeps, wide enough for surfaces 10 um tall; what is taller takes a program of its own.
+_MOST_BLOCKS = 16  # of 16 Chebyshev terms
+_MOST_S_NODES = 512
+_MOST_W_TERMS = 136  # a config may ask for 128, and planning looks a few further
+# coefficients under a window along an axis: 1e-12 on a patch of twenty sigma, all that a stack holds, takes 49
+MOST_TAPS = 49
+
+MOST_PAIRS = 128  # of samples and their mirror images in the first step of a transform: n1 / 2 + 1 of n = n1 n2
+ORDER = 8  # nodes of every interpolation of the spectral operator, over r and along kappa
+MOST_RINGS = 8  # of a group of rings, whose sums stay in the nearest cache
+
+
+def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Program:
+    """The kernels of a polar table, in single precision.
+
+    term_blocks, s_nodes, w_terms: blocks of 16 Chebyshev terms, nodes in s and terms in |w| that it must hold.
+    """
+    constants = {
+        **_stack("float", 16),
+        **blocks.chosen("RADII", "S_BLOCK", "W_BLOCK", "SHARE_BLOCK"),
+        "MOST_BLOCKS": device.bound(term_blocks, _MOST_BLOCKS),
+        "MOST_S_NODES": device.bound(s_nodes, _MOST_S_NODES),
+        "MOST_W_TERMS": device.bound(w_terms, _MOST_W_TERMS),
+        "MOST_TAPS": MOST_TAPS,
+        "ORDER": ORDER,
+        "MOST_RINGS": MOST_RINGS,
+    }
+    files = "dft_stack.cl", "polar_spectrum.cl", "spectral_operator.cl", "cubic_spline.cl"
+    return device.program(files, constants)
+
+
+def exact() -> device.Program:
+    """The kernels of the exact reference, in double precision."""
+    return device.program(("dft_stack.cl", "power_spectrum.cl"), {**_stack("double", 8), "MOST_TAPS": MOST_TAPS})
+
+
+def _stack(real: str, lanes: int) -> dict[str, int | str]:
+    """Constants of dft_stack.cl, whose vectors of `lanes` numbers have 64 bytes."""
+    sizes = blocks.chosen("STEP_X", "STEP_Y", "KEPT")
+    most_step = max(sizes["STEP_X"], sizes["STEP_Y"])
+    return {"REAL": real, "LANES": lanes, "MOST_PAIRS": MOST_PAIRS, "MOST_STEP": most_step, **sizes}
