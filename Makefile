@@ -7,7 +7,7 @@ BAKE := $(VENV)/bin/diffract-bake
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench validation test lint clean
+.PHONY: help setup bake pipeline bench validation test test-fast lint clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -15,6 +15,7 @@ help:
 	@echo "make bench                   run time against error of every way to a table: table, plots, verdicts"
 	@echo "make validation              every method beside the literature's figures and theory: a page each, verdicts"
 	@echo "make test                    set up, then run linters and every test"
+	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
 	@echo "make lint                    ruff and mypy alone"
 	@echo "make setup                   only the set-up"
 	@echo "make clean                   remove the environment and $(OUT)"
@@ -72,6 +73,9 @@ lint: $(VENV)/ready
 
 test: setup lint
 	$(VENV)/bin/python -m pytest
+
+test-fast: setup
+	$(VENV)/bin/python -m pytest -m "not slow"
 
 clean:
 	rm -rf $(VENV) $(OUT) *.egg-info

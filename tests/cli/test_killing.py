@@ -12,6 +12,8 @@ from tests.support import killed_at
 
 STAGES = ["surface", "stack", "table", "render", "validate"]
 
+pytestmark = pytest.mark.slow
+
 # a real interrupt, as the keyboard's, once validation is at work and has a file in its folder
 INTERRUPTED = """
 import os, signal
