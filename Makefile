@@ -7,7 +7,7 @@ BAKE := $(VENV)/bin/diffract-bake
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench validation test lint clean
+.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -15,6 +15,7 @@ help:
 	@echo "make bench                   run time against error of every way to a table: table, plots, verdicts"
 	@echo "make validation              every method beside the literature's figures and theory: a page each, verdicts"
 	@echo "make test                    set up, then run linters and every test"
+	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
 	@echo "make test-avx2               the kernels' tests and two bakes, built for a processor without AVX-512"
 	@echo "make lint                    ruff and mypy alone"
 	@echo "make setup                   only the set-up"
@@ -76,10 +77,12 @@ lint: $(VENV)/ready
 test: setup lint
 	$(VENV)/bin/python -m pytest
 
+test-fast: setup
+	$(VENV)/bin/python -m pytest -m "not slow"
+
 # PoCL builds for a processor without AVX-512 on one that has it, into a kernel cache of its own. Debian's build of PoCL
 # listens to the first variable, others to the second.
 AVX2_TESTS := tests/physics tests/cli/test_device.py tests/cli/test_polar.py tests/cli/test_run.py
-.PHONY: test-avx2
 test-avx2: setup
 	cache="$$(mktemp -d)" && trap 'rm -rf "$$cache"' EXIT && \
 		POCL_KERNELLIB_NAME=avx2 POCL_LLVM_CPU_NAME=haswell XDG_CACHE_HOME="$$cache" $(VENV)/bin/python -m pytest $(AVX2_TESTS)

@@ -1,4 +1,4 @@
-"""What tests share: where real scans are, and fields made of them."""
+"""What tests share: where real scans are, fields made of them, and processes that die at a moment asked for."""
 
 from pathlib import Path
 
@@ -9,6 +9,29 @@ from pipeline.surface.conditioning import condition
 from pipeline.surface.heightfield import HeightField
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+_KILLED_AT = """
+import atexit, os, signal, sys
+left = {count}
+def hook(event, arguments):
+    global left
+    if event in ("os.mkdir", "os.rename", "os.remove", "os.utime", "shutil.copyfile") or (
+        event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
+    ):
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+sys.addaudithook(hook)
+atexit.register(lambda: print("changes:", {count} - left, file=sys.stderr))
+"""
+
+
+def killed_at(count: int) -> str:
+    """Python that runs first in a process and kills it just before its `count`-th change to the disk.
+
+    One that comes to its end tells on stderr how many "changes: " there were.
+    """
+    return _KILLED_AT.format(count=count)
 
 
 def shared_file(name: str) -> Path:

@@ -372,6 +372,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(sections=st.dictionaries(st.sampled_from(sorted(Config.model_fields)) | st.text(max_size=5), values))
 def test_no_document_makes_anything_but_a_config_or_a_config_fault(tmp_path_factory, sections):

@@ -12,6 +12,8 @@ from pipeline.optics.spectra import trapezoid
 from pipeline.series import chebyshev_order, float32_rounding, largest_phase, plan_taylor
 from pipeline.surface.heightfield import HeightField
 
+pytestmark = pytest.mark.physics
+
 LASER = trapezoid(Spectrum(illuminant=LaserLine(lambda_nm=500.0)), 1.0)
 T = np.linspace(-1.0, 1.0, 401)
 

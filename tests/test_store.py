@@ -1,13 +1,12 @@
 """The store: artifacts are there whole or not at all, and what was changed is never taken for what was made."""
 
-import contextlib
 import errno
 import hashlib
+import itertools
 import json
 import multiprocessing
 import os
 import platform
-import random
 import shutil
 import signal
 import subprocess
@@ -21,6 +20,7 @@ import pytest
 from pipeline import store as store_module
 from pipeline.errors import DamagedError, StorageError
 from pipeline.store import RECORD, Store
+from tests.support import killed_at
 
 
 def key_of(name):
@@ -126,13 +126,18 @@ def test_the_first_of_two_writers_without_a_lock_stays(store):
     assert list((store.root / "tmp").iterdir()) == []
 
 
-def make_once(root, log):
-    """What a run does for one step: waits for the lock, makes the artifact unless it stands."""
+def make_once(root, log, coming, count):
+    """What a run does for one step: waits for the lock, makes the artifact unless it stands.
+
+    `coming` is a semaphore that counts who comes for the lock: the maker is not done before all `count` have.
+    """
     store = Store(root)
+    coming.release()
     with store.lock("surface", K1):
         if not store.has("surface", K1):
             with store.create("surface", K1, RECORDED) as (folder, _):
-                time.sleep(0.05)
+                for _ in range(count):
+                    assert coming.acquire(timeout=60.0)
                 (folder / "a.txt").write_text("content")
             with log.open("a") as stream:
                 stream.write("made\n")
@@ -141,7 +146,8 @@ def make_once(root, log):
 
 def test_threads_make_an_artifact_once(store, tmp_path):
     """Four that want the same artifact at once: one makes it, the others wait and share it."""
-    threads = [threading.Thread(target=make_once, args=(store.root, tmp_path / "log")) for _ in range(4)]
+    arguments = (store.root, tmp_path / "log", threading.Semaphore(0), 4)
+    threads = [threading.Thread(target=make_once, args=arguments) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -152,7 +158,8 @@ def test_threads_make_an_artifact_once(store, tmp_path):
 def test_processes_make_an_artifact_once(store, tmp_path):
     """The same across processes."""
     context = multiprocessing.get_context("spawn")
-    processes = [context.Process(target=make_once, args=(store.root, tmp_path / "log")) for _ in range(3)]
+    arguments = (store.root, tmp_path / "log", context.Semaphore(0), 3)
+    processes = [context.Process(target=make_once, args=arguments) for _ in range(3)]
     for process in processes:
         process.start()
     for process in processes:
@@ -409,38 +416,52 @@ def test_a_limit_on_file_size_is_a_storage_fault(store):
 
 # --- writers that die --------------------------------------------------------------------------------
 
-ENDLESS = """
-import itertools, sys
+WRITER = """
+import sys
 from pathlib import Path
 from pipeline.store import Store
-store = Store(Path(sys.argv[1]))
-for i in itertools.count():
-    with store.lock("surface", key_of(f"k{i}")):
-        print(i, flush=True)
-        with store.create("surface", key_of(f"k{i}"), {"name": "a"}) as (folder, _):
-            for j in range(10):
-                (folder / f"{j}.bin").write_bytes(bytes(50_000))
+store, key = Store(Path(sys.argv[1])), sys.argv[2]
+with store.lock("surface", key), store.create("surface", key, {"name": "a"}) as (folder, _):
+    for name in ("0.bin", "1.bin", "2.bin"):
+        (folder / name).write_bytes(bytes(50_000))
+        print(name, flush=True)
 """
 
 
+def write_until(root, count):
+    """Runs WRITER until just before its `count`-th change to the disk: exit code, and files it says it wrote."""
+    command = [sys.executable, "-c", killed_at(count) + WRITER, str(root), K1]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, -signal.SIGKILL), done.stderr
+    return done.returncode, done.stdout.split()
+
+
 def test_a_killed_writer_leaves_a_clean_store(store):
-    """Killed at any moment, a run leaves whole artifacts or none, no held lock, and only litter to collect."""
-    chance = random.Random(8)
-    for _ in range(6):
-        command = [sys.executable, "-c", ENDLESS, str(store.root)]
-        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
-            process.stdout.readline()
-            time.sleep(chance.uniform(0.0, 0.06))
-            process.send_signal(signal.SIGKILL)
-            begun = [0, *map(int, process.stdout.read().split())]
+    """Killed before any of its changes to the disk, a writer leaves litter: nothing to be seen, no lock held."""
+    seen = set()
+    for count in itertools.count(1):
+        sound = make(store, K2)
+        code, written = write_until(store.root, count)
+        if code == 0:
+            break
+        litter = list((store.root / "tmp").iterdir())
+        # what it says it wrote lies there, half an artifact or a whole one without its name
+        assert sorted(p.name for each in litter for p in each.glob("*.bin")) == written
+        held = sum(path.stat().st_size for path in everything(store.root / "tmp") if path.is_file())
+        assert held >= 50_000 * len(written)
+        seen.add(len(written))
+        assert not store.has("surface", K1)
+        assert [artifact.folder for artifact in store.artifacts()] == [sound]
         assert store.check() == []
-        last = key_of(f"k{begun[-1]}")
-        with store.lock("surface", last):
-            if not store.has("surface", last):
-                make(store, last)
-        store.collect(None)
+        # the lock went with its holder, and what it left is in nobody's way
+        with store.lock("surface", K1):
+            make(store, K1)
+        assert store.open("surface", K1).bytes == len("content") + 100
+        assert store.collect(None) == (len(litter), held)
         assert list((store.root / "tmp").iterdir()) == []
-        for artifact in store.artifacts():
-            store.open(artifact.stage, artifact.key)
-        with contextlib.suppress(FileNotFoundError):
-            shutil.rmtree(store.root)
+        assert store.open("surface", K2).folder == sound
+        shutil.rmtree(store.root)
+    # before its first file, between any two, and with all of them written
+    assert seen == {0, 1, 2, 3}
+    assert written == ["0.bin", "1.bin", "2.bin"]
+    assert store.open("surface", K1).bytes == 150_000

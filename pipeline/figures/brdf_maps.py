@@ -22,6 +22,7 @@ from pipeline.figures.exact_maps import (
     views_of,
 )
 from pipeline.figures.figure import Bench, Check, Figure, Picture, Surface, Table
+from pipeline.figures.method_runs import OURS, PAPER, on_elaphe
 from pipeline.methods.catalogue import METHODS
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import pixels
@@ -69,7 +70,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
     blazed, pits, elaphe = (_show(each, views, [NORMAL], progress)[0] for each in (bench.blazed, disc, bench.elaphe))
     xenopeltis = _show(bench.xenopeltis, views, _INCIDENCES, progress)
     shown = [blazed, pits, elaphe, *xenopeltis]
-    look_up = METHODS["D14 look-up"](bench.elaphe.field, bench.elaphe.config).xyz(*directions(views, NORMAL))
+    look_up = on_elaphe(bench, PAPER).xyz
     return Figure(
         name="brdf_maps",
         title="BRDF maps",
@@ -100,7 +101,7 @@ def _disc(bench: Bench) -> Surface:
 
 
 def _show(surface: Surface, views: Map, lights: Sequence[Light], progress: Progress) -> list[_Shown]:
-    table = METHODS["polar table"](surface.field, surface.config)
+    table = METHODS[OURS](surface.field, surface.config)
     exact = exact_maps(surface, views, lights, progress)
     return [
         _Shown(surface, light, truth, table.xyz(*directions(views, light)))

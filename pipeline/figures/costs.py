@@ -5,14 +5,11 @@ from collections.abc import Sequence
 from pipeline.evaluate import Map
 from pipeline.figures.exact_maps import SHOWN_RU, STRICT_RU, mean_delta_e, views_of
 from pipeline.figures.figure import Bench, Check, Figure, Picture, Surface, Table
-from pipeline.figures.method_runs import EXACT_NAME, OURS, PAPER, Run, run
+from pipeline.figures.method_runs import EXACT_NAME, OURS, PAPER, Run, on_elaphe
 from pipeline.methods.catalogue import METHODS
 from pipeline.progress import Progress
-from pipeline.validation import MAP_RADIUS
 
 _TIMES_BELOW = 10.0
-# enough to compile what a method runs on the device
-_WARM_UP = Map(11, MAP_RADIUS)
 _LITERATURE_COLOURS = {"[D14]": "#d55e00", "[S14]": "#009e73", "[S99]": "#cc79a7", "[G04]": "#e69f00"}
 _OUR_COLOUR = "#0072b2"
 _TIMING = (
@@ -29,8 +26,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
     surface, views = bench.elaphe, views_of(bench)
     runs = []
     for done, name in enumerate(METHODS, start=1):
-        run(name, surface, _WARM_UP)
-        runs.append(run(name, surface, views))
+        runs.append(on_elaphe(bench, name))
         progress("costs of methods", done / len(METHODS))
     exact = next(each for each in runs if each.name == EXACT_NAME)
     errors = {each.name: _errors(surface, each, exact) for each in runs}

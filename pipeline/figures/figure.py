@@ -2,11 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.config import Config
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField
+
+if TYPE_CHECKING:
+    from pipeline.figures.method_runs import Run
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,17 @@ class Surface:
 
 @dataclass(frozen=True)
 class Bench:
-    """What the pages are made of. quick: smaller maps and fewer points, for a first look and for tests."""
+    """What the pages are made of.
+
+    quick: smaller maps and fewer points, for a first look and for tests. runs: methods at work on Elaphe, by name,
+    which several pages show (pipeline.figures.method_runs).
+    """
 
     blazed: Surface
     elaphe: Surface
     xenopeltis: Surface
     quick: bool
+    runs: "dict[str, Run]" = field(default_factory=dict, init=False, repr=False, compare=False)
 
 
 # a page's maker

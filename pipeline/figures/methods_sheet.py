@@ -10,7 +10,7 @@ from pipeline.figures import method_traits as traits
 from pipeline.figures.exact_maps import SHOWN_RU, STRICT_RU, views_of
 from pipeline.figures.figure import Bench, Check, Figure, Picture, Surface, Table
 from pipeline.figures.laser_screen import VISIBLE_CONTRAST
-from pipeline.figures.method_runs import EXACT_NAME, OURS, run
+from pipeline.figures.method_runs import EXACT_NAME, OURS, on_elaphe, run
 from pipeline.methods.method import PUBLISHED_STEP_NM, Method
 from pipeline.methods.nmm import Nmm
 from pipeline.optics.coherence import sigma_f
@@ -69,7 +69,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
     """The page: every method's map of three surfaces (quick: two) at normal incidence, and what marks each."""
     views = views_of(bench)
     surfaces = (bench.blazed, bench.elaphe, *(() if bench.quick else (bench.xenopeltis,)))
-    sheets = [_sheet(surface, views, progress) for surface in surfaces]
+    sheets = [_sheet(bench, surface, views, progress) for surface in surfaces]
     blazed, elaphe = sheets[:2]
     radius = _white_radius(elaphe)
     centre = traits.across_the_centre(elaphe.surface, elaphe.some(EXACT_NAME, "NMM"), radius)
@@ -100,10 +100,10 @@ def make(bench: Bench, progress: Progress) -> Figure:
     )
 
 
-def _sheet(surface: Surface, views: Map, progress: Progress) -> _Sheet:
+def _sheet(bench: Bench, surface: Surface, views: Map, progress: Progress) -> _Sheet:
     unit, methods, maps = relative_unit(surface.config), {}, {}
     for done, name in enumerate(_ORDER, start=1):
-        made = run(name, surface, views)
+        made = on_elaphe(bench, name) if surface is bench.elaphe else run(name, surface, views)
         methods[name], maps[name] = made.method, made.xyz / unit
         progress(f"methods on {surface.name}", done / len(_ORDER))
     width = sigma_f(surface.config.coherence.sigma_um) * 1e-3 * surface.config.spectrum.range_nm[1]

@@ -128,6 +128,7 @@ def test_a_bundle_errs_as_it_says(
     assert f"in {textures} of 9 textures" in (folder / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_more_textures_err_less(bake: Baker, tmp_path: Path) -> None:
     errors = [loss_of(published_with(bake, tmp_path, textures=n)[1]).added.mean for n in (1, 3, 6, 9)]
     assert errors == sorted(errors, reverse=True)
@@ -150,6 +151,7 @@ def budgeted(**publish: Any) -> Any:
     return small("polar", accuracy={"delta_e": BUDGET}, publish={"precision": "half", **publish})
 
 
+@pytest.mark.slow
 def test_auto_takes_the_fewest_textures_of_the_budget(bake: Baker, tmp_path: Path) -> None:
     loss = loss_of(manifest_of(publish(budgeted(), bake(budgeted()), tmp_path)))
     assert loss.error.mean <= BUDGET
@@ -160,6 +162,7 @@ def test_auto_takes_the_fewest_textures_of_the_budget(bake: Baker, tmp_path: Pat
     assert len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_auto_takes_all_where_no_number_keeps_the_budget(
     bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -30,6 +30,12 @@ def baked(first_run: tuple[Tool, Result]) -> Tool:
     return first_run[0]
 
 
+@pytest.fixture(scope="session")
+def published(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store for what configs/ and the validation bench hold, empty at first: each artifact is made once for all."""
+    return tmp_path_factory.mktemp("published")
+
+
 @pytest.fixture
 def copy(baked: Tool, tmp_path: Path) -> Tool:
     """A copy of `baked` to change at will."""

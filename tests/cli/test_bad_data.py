@@ -160,6 +160,7 @@ def test_the_file_and_the_config_disagree(tool: Tool) -> None:
     refused(tool, bake(tool, path, height_unit="nm"), "units that agree", "override_file_units")
 
 
+@pytest.mark.slow
 def test_a_pitch_too_coarse_is_said_with_the_share(tool: Tool) -> None:
     scan = npy(tool, HILLS)
     # `run` warns, and so does its report

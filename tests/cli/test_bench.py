@@ -9,6 +9,8 @@ from cli.bench import _paths
 from cli.sources import load
 from tests.cli.tool import Result, Tool, recipe
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def benched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Tool, Result]:

@@ -134,6 +134,7 @@ def test_publish_warns_as_run_does(tool: Tool) -> None:
     assert "warning: " in result.stderr
 
 
+@pytest.mark.slow
 def test_bench_of_a_grating(copy: Tool) -> None:
     result = copy("bench", "small.toml", "--quick", "--json")
     assert result.code == 0, result.stderr

@@ -1,17 +1,31 @@
-"""The slowest test: every config in configs/ is baked whole by one command, as published."""
+"""The slowest test: every config in configs/ is baked whole, as published."""
 
 import tomllib
+from pathlib import Path
+
+import pytest
 
 from tests.cli.tool import REPOSITORY, Tool
 
+CONFIGS = sorted((REPOSITORY / "configs").glob("*.toml"))
 
-def test_every_config_bakes(tool: Tool) -> None:
-    paths = sorted((REPOSITORY / "configs").glob("*.toml"))
-    names = [tomllib.loads(path.read_text(encoding="utf-8"))["name"] for path in paths]
-    result = tool("run", *paths, "--json")
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_every_config_bakes(tool: Tool, published: Path, path: Path) -> None:
+    name = tomllib.loads(path.read_text(encoding="utf-8"))["name"]
+    result = tool("run", path, "--json", "--store", published)
     assert result.code == 0, result.stderr
-    assert [told["name"] for told in result.json] == names
-    for name in names:
-        report = (tool.out / name / "report.html").read_text(encoding="utf-8")
-        assert f"<title>{name}</title>" in report
-        assert tool("verify", tool.bundle(name)).code == 0
+    assert [told["name"] for told in result.json] == [name]
+    report = (tool.out / name / "report.html").read_text(encoding="utf-8")
+    assert f"<title>{name}</title>" in report
+    assert tool("verify", tool.bundle(name)).code == 0
+
+
+def test_several_configs_bake_in_one_command(copy: Tool) -> None:
+    """In their order; the second is the first under another name."""
+    result = copy("run", "small.toml", copy.config("other.toml", name="other"), "--json")
+    assert result.code == 0, result.stderr
+    assert [told["name"] for told in result.json] == ["small", "other"]
+    for name in ("small", "other"):
+        assert copy("verify", copy.bundle(name)).code == 0

@@ -3,36 +3,34 @@
 import re
 import shutil
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import pytest
 
 from tests.cli.tool import Tool, leavings
+from tests.support import killed_at
 
 STAGES = ["surface", "stack", "table", "render", "validate"]
 
-# counts what changes the disk and kills its own process at one of them
-KILLED_AT = """
-import os, signal, sys
-left = {count}
-def hook(event, arguments):
-    global left
-    if event in ("os.mkdir", "os.rename", "os.remove", "os.utime", "shutil.copyfile") or (
-        event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
-    ):
-        left -= 1
-        if left == 0:
-            os.kill(os.getpid(), signal.SIGKILL)
-sys.addaudithook(hook)
-import atexit
-atexit.register(lambda: print("events:", {count} - left, file=sys.stderr))
+pytestmark = pytest.mark.slow
+
+# a real interrupt, as the keyboard's, once validation is at work and has a file in its folder
+INTERRUPTED = """
+import os, signal
+from pipeline.stages import validate
+produce = validate._produce
+def interrupted(config, inputs, folder, progress):
+    (folder / "half.txt").write_text("half")
+    def tell(step, done):
+        os.kill(os.getpid(), signal.SIGINT)
+        progress(step, done)
+    return produce(config, inputs, folder, tell)
+validate._produce = interrupted
 """
 
 
-def test_killed_after_every_stage_and_in_between(baked: Tool, tool: Tool) -> None:
-    """Each run is killed as its first stage is done, or so many seconds after its start."""
+def test_killed_after_every_stage(baked: Tool, tool: Tool) -> None:
+    """Each run is killed as its first stage is done."""
     config = tool.config()
     for stage in STAGES:
         with tool.start("run", config) as process:
@@ -46,33 +44,30 @@ def test_killed_after_every_stage_and_in_between(baked: Tool, tool: Tool) -> Non
 
 
 def test_killed_at_moments_spread_over_the_run(baked: Tool, tool: Tool) -> None:
-    config, delay, killed = tool.config(), 0.5, 0
-    while True:
-        with tool.start("run", config) as process:
-            try:
-                process.communicate(timeout=delay)
-            except subprocess.TimeoutExpired:
-                process.kill()
-        if process.returncode == 0:
-            break
-        assert process.returncode == -signal.SIGKILL
-        killed, delay = killed + 1, delay * 1.6
-    assert killed >= 3
+    """Each run gets further into what the ones before have left to do, until one comes to its end."""
+    config, count, stood = tool.config(), 30, []
+    while (result := tool.process("run", config, wrapper=killed_at(count))).code != 0:
+        assert result.code == -signal.SIGKILL, result.stderr
+        stood.append(len(tool.artifacts()))
+        count += 30
+    # before anything was made, and with more and more of it
+    assert stood == sorted(stood)
+    assert len({*stood}) >= 3
     assert_ends_as(baked, tool)
 
 
 def test_killed_while_results_are_laid_out_and_published(baked: Tool, copy: Tool) -> None:
     shutil.rmtree(copy.out)
-    whole = copy.process("run", "small.toml", wrapper=KILLED_AT.format(count=10**9))
+    whole = copy.process("run", "small.toml", wrapper=killed_at(10**9))
     assert whole.code == 0, whole.stderr
-    found = re.search(r"events: (\d+)", whole.stderr)
+    found = re.search(r"changes: (\d+)", whole.stderr)
     assert found is not None
-    events = int(found[1])
-    assert events > 25
+    changes = int(found[1])
+    assert changes > 25
     shutil.rmtree(copy.out)
     seen = 0
     for share in (0.08, 0.16, 0.24, 0.5, 0.6, 0.8, 0.9, 0.97, 1.0):
-        result = copy.process("run", "small.toml", wrapper=KILLED_AT.format(count=max(1, int(share * events))))
+        result = copy.process("run", "small.toml", wrapper=killed_at(max(1, int(share * changes))))
         assert result.code in (0, -signal.SIGKILL), result.stderr
         seen += result.code != 0
         for bundle in copy.out.glob("small/small-*"):
@@ -98,17 +93,10 @@ def assert_ends_as(undisturbed: Tool, tool: Tool) -> None:
 
 
 def test_interrupted_by_the_keyboard(tool: Tool) -> None:
-    with tool.start("run", tool.config()) as process:
-        assert process.stderr is not None
-        for line in process.stderr:
-            if line.startswith("  table"):
-                break
-        time.sleep(0.3)
-        process.send_signal(signal.SIGINT)
-        _, stderr = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert stderr.splitlines()[-1] == "interrupted; finished stages are kept"
-    assert "Traceback" not in stderr
+    result = tool.process("run", tool.config(), wrapper=INTERRUPTED)
+    assert result.code == 130
+    assert result.stderr.splitlines()[-1] == "interrupted; finished stages are kept"
+    assert "Traceback" not in result.stderr
     assert list(tool.artifacts()) == ["render", "stack", "surface", "table"]
     assert leavings(tool) == []
 

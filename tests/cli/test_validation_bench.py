@@ -2,6 +2,7 @@
 
 import json
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +47,12 @@ def first(bench: Bench, _progress: object) -> Figure:
     return Figure(
         "first", "First", "[D14] fig. 1", "all well", checks, [table], [Picture(picture(), "a line")], numbers=NUMBERS
     )
+
+
+@pytest.fixture
+def tool(tool: Tool, published: Path) -> Tool:
+    """An empty folder, and the store that other tests left the bench's surfaces in."""
+    return Tool(tool.folder, published)
 
 
 @pytest.fixture

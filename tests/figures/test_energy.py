@@ -14,6 +14,8 @@ from pipeline.reference import Reference
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
 
+pytestmark = pytest.mark.physics
+
 # lobes twice as wide as sunlight's: a quarter of the views
 SIGMA = 8.0
 FLAT = HeightField(np.zeros((8, 16)), (2.0, 2.0))
@@ -79,6 +81,7 @@ def test_asymmetry_sees_a_brdf_that_is_not_reciprocal() -> None:
     assert energy.asymmetry(Lambertian(), *energy.pairs(20)) > 0.1
 
 
+@pytest.mark.slow
 def test_the_page_holds() -> None:
     bench = Bench(small("blazed", 16.25), small("elaphe"), small("xenopeltis", pitch_um=0.1), quick=True)
     figure = energy.make(bench, silent)

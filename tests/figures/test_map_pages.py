@@ -174,6 +174,7 @@ ALWAYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_every_page_is_whole(bench: Bench, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its numbers are for machines, its tables even, its pictures PNGs; and closed forms hold on a small patch."""

@@ -12,6 +12,8 @@ from pipeline.figures.order_efficiencies import Answers, Grating, known_gratings
 from pipeline.progress import silent
 from pipeline.surface import recipes
 
+pytestmark = pytest.mark.physics
+
 SIGMA = 8.0
 AT = order_efficiencies.places(np.array([430.0, 650.0]))
 
@@ -70,6 +72,7 @@ def test_a_wrong_profile_is_told(found: dict[str, Answers]) -> None:
     assert held == [False, False, False, True, True]
 
 
+@pytest.mark.slow
 def test_the_page_holds() -> None:
     recipe = {"kind": "blazed", "size_um": 20.0, "pitch_um": 0.25}
     config = Config.model_validate(

@@ -16,6 +16,8 @@ from pipeline.progress import silent
 from pipeline.surface import recipes
 from pipeline.surface.statistics import Period
 
+pytestmark = pytest.mark.physics
+
 needs_solver = pytest.mark.skipif(not coupled_wave.available(), reason="meent, of the extra bench, is not installed")
 
 DEPTHS = (0.1, 0.3, 0.5)
@@ -97,6 +99,7 @@ def solved() -> dict[Case, scalar_errors.Efficiencies]:
     return scalar_errors.sweep([*(Case(*key[:4]) for key in KNOWN), *LONG], np.array(DEPTHS), silent)
 
 
+@pytest.mark.slow
 @needs_solver
 @pytest.mark.parametrize("key", KNOWN, ids=str)
 def test_extrapolated_waves_meet_a_boundary_integral(
@@ -107,6 +110,7 @@ def test_extrapolated_waves_meet_a_boundary_integral(
     assert found == pytest.approx(KNOWN[key], abs=validity._RELIABLE[key[1]])
 
 
+@pytest.mark.slow
 @needs_solver
 @pytest.mark.parametrize("case", LONG, ids=str)
 def test_long_shallow_gratings_are_scalar(solved: dict[Case, scalar_errors.Efficiencies], case: Case) -> None:
@@ -170,6 +174,7 @@ def test_without_the_solver_the_page_quotes_its_table(monkeypatch: pytest.Monkey
     assert figure.pictures == []
 
 
+@pytest.mark.slow
 @needs_solver
 def test_the_page_says_where_the_table_does_not_hold(
     monkeypatch: pytest.MonkeyPatch, solved: dict[Case, scalar_errors.Efficiencies]

@@ -17,6 +17,8 @@ from pipeline.reference import Reference, power_direct
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
 
+pytestmark = pytest.mark.physics
+
 SIGMA_UM = 16.25
 LAMBDA_NM = np.array([400.0, 550.0, 700.0])
 FROM_MINUS_X = Plane(THETA_I, np.pi)
@@ -136,6 +138,7 @@ def test_the_published_bias_of_the_blazed_grating_is_the_reflectances_slope() ->
     assert cut.lines[0][1].mean == pytest.approx(2500.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_page_says_all_of_it() -> None:
     small = {"size_um": 25.0, "pitch_um": 0.1}
     bench = Bench(

@@ -86,6 +86,7 @@ def test_the_white_circle_may_be_drawn_elsewhere() -> None:
     assert np.all(Nmm(field, ELAPHE, white_radius=0.04).xyz(wi, wr)[:, 1] < 0.3)
 
 
+@pytest.mark.slow
 def test_as_coefficients_crowd_it_becomes_the_whole_integral() -> None:
     """Patches of 4, 12 and 36 sigma: the wavelengths that land go from every other lobe to five a lobe."""
     errors = []

@@ -135,6 +135,7 @@ def test_disc_window_against_the_sum_over_lags() -> None:
     np.testing.assert_allclose(found[bright], expected[bright], rtol=0.05)
 
 
+@pytest.mark.slow
 def test_many_random_surfaces_scatter_like_this_in_the_mean() -> None:
     """Exact |P|^2 of 300 Gaussian surfaces of one covariance: their mean is Stam's expectation, within its error."""
     shape, pitch, sigma, count = (96, 96), (0.1, 0.1), 1.6, 300

@@ -1,6 +1,7 @@
 """The bench's other ways to the same numbers, its counts of work, and its verdicts."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from pipeline.bench.criteria import Criterion
 from pipeline.bench.machine import Machine, Timed, Work
 from pipeline.bench.polar_bake import Stages
 from pipeline.bench.setting import Setting
+from pipeline.bench.timing import best_of
 from pipeline.bench.truth import MapTruth
 from pipeline.config import Coherence, Config, Material, Mirror, PolarLayout, Spectrum, Surface
 from pipeline.surface.heightfield import HeightField
 from pipeline.validation import relative_error
+
+pytestmark = pytest.mark.slow
 
 SIGMA_UM = 2.0
 
@@ -130,11 +134,40 @@ def test_a_share_is_of_what_binds() -> None:
     assert (reached.bound, reached.bound_share) == ("bandwidth", 0.75)
 
 
-def test_the_device_is_measured() -> None:
-    single, double = (device.measure_peak(precision, 0.05) for precision in ("single", "double"))
-    assert single > 1e8
-    assert double > 1e8
-    assert device.measure_bandwidth(0.05) > 1e8
+@pytest.mark.parametrize(("precision", "lanes", "real"), [("single", 16, np.float32), ("double", 8, np.float64)])
+def test_a_peak_is_the_kernels_operations_over_its_shortest_launch(
+    precision: Literal["single", "double"], lanes: int, real: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Operations are those that the kernel's text spells out, and what it writes shows that it did them."""
+    launched = []
+    launch = device.Program.launch
+
+    def note(self: device.Program, kernel: str, size: tuple[int, ...], steps: np.int32, buffer: object) -> None:
+        launched.append((size[0], int(steps), buffer))
+        launch(self, kernel, size, steps, buffer)
+
+    monkeypatch.setattr(device.Program, "launch", note)
+    with device.timing() as launches:
+        peak = device.measure_peak(precision, 0.1)
+    items, steps, buffer = launched[-1]
+    chains = device.source("peak.cl").count("= fma(")
+    # the first compiles; a listener's own stopwatch stops a little later
+    shortest = min(each.seconds for each in launches[1:])
+    assert peak == pytest.approx(2 * chains * lanes * steps * items / shortest, rel=0.05)
+    # x = 0.999 x + 0.001 n comes to n, in every lane of every chain, and not before some thousand steps
+    found = device.download(buffer, np.empty(items, real))
+    np.testing.assert_allclose(found, chains * lanes * np.arange(items), rtol=1e-3, atol=1e-3)
+
+
+def test_bandwidth_is_three_arrays_over_the_shortest_launch() -> None:
+    """Beside numpy's own copy, which reads one array and writes one: neither is far from what memory allows."""
+    with device.timing() as launches:
+        bandwidth = device.measure_bandwidth(0.3)
+    shortest = min(each.seconds for each in launches[1:])
+    ones = np.ones(round(bandwidth * shortest / 3.0), np.uint8)
+    out = np.empty_like(ones)
+    _, copied_s = best_of(5, lambda: np.copyto(out, ones))
+    assert 0.2 < bandwidth / (2.0 * ones.nbytes / copied_s) < 5.0
 
 
 def test_launches_are_heard_only_while_one_listens() -> None:

@@ -17,6 +17,8 @@ from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables import plan, polar, quadrature, scattering
 
+pytestmark = pytest.mark.slow
+
 SIGMA = 2.0
 
 

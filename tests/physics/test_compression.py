@@ -174,6 +174,7 @@ def mirror_error(stored: Textures, table: PolarTable) -> float:
     return float(delta_e(look_up(stored, uvw), polar.look_up(table, uvw), 1.0).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["elaphe", "xenopeltis"])
 def test_few_half_textures_hold_a_snake(name: str) -> None:
     table, uvw, factor, truth = snake_table(name)

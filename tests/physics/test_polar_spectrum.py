@@ -173,6 +173,7 @@ def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeyp
     assert np.sqrt(np.mean(((together - alone) / level) ** 2)) < 1e-3
 
 
+@pytest.mark.slow
 def test_wavelengths_follow_the_radius() -> None:
     """Near the mirror direction a few, at the rim many; and the estimate bounds what is measured."""
     rho, tolerance = Rings(40, 0.1).rho(), 1e-3

@@ -187,6 +187,7 @@ def test_progress_is_told_cell_by_cell() -> None:
     assert told == [("stress", 0.5), ("stress", 1.0)]
 
 
+@pytest.mark.slow
 def test_a_table_is_held_against_fresh_directions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Baked and certified it is within its budget; a look-up gone dark or gone NaN afterwards is found."""
     cell = replace(NOISE, way="table", height_um=0.3, shape=(32, 32), sigma_um=0.8)
