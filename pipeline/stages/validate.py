@@ -51,6 +51,10 @@ def _measured(
     evaluate = table_evaluator(table.load(config, inputs["table"]), config)
     reference = reference_of(field, config, progress)
     radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
+    first = render.light_direction(config.render.lights[0])
+    study = _study(config, inputs, evaluate, convergence.CoarseMap(reference, config, first, radius))
+    curves = _curves(study.curves(inputs["table"].summary["wavelengths"] > 1), progress)
+    drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
     maps: list[dict[str, Any]] = []
     for light in config.render.lights:
         towards, named = render.light_direction(light), f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
@@ -58,10 +62,6 @@ def _measured(
         picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
         drawn[f"comparison_{render.map_name(light)}"] = picture
         maps.append({**light.model_dump(), "colour": [asdict(error) for error in check.colour]})
-    first = render.light_direction(config.render.lights[0])
-    study = _study(config, inputs, evaluate, convergence.CoarseMap(reference, config, first, radius))
-    curves = _curves(study.curves(inputs["table"].summary["wavelengths"] > 1), progress)
-    drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
     results: Summary = {
         **_on_random_directions(config, inputs, evaluate, reference, progress),
         "maps": maps,
