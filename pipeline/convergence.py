@@ -116,8 +116,10 @@ class PolarStudy:
     """Rings, azimuths, terms in |w| and wavelength step of the polar table, everything else as planned."""
 
     def __init__(self, spectrum: PolarSpectrum, planned: plan.Plan, chosen: Evaluator, views: CoarseMap) -> None:
-        self._spectrum, self._plan, self._chosen, self._views = spectrum, planned, chosen, views
+        self._spectrum, self._plan, self._views = spectrum, planned, views
         self._config = views.config
+        self._chosen = views.error(chosen)
+        self._rules = self._rules_of(planned.rings.rho())
 
     def curves(self, has_steps: bool) -> Study:
         """Every setting; a laser line has no wavelength step to vary."""
@@ -127,22 +129,22 @@ class PolarStudy:
         """Mean error against the number of rings."""
         chosen = self._plan.rings.count
         counts = sorted({max(8, round(chosen * share)) for share in (0.25, 0.35, 0.5, 0.7)} - {chosen})
-        errors = [self._error(replace(self._plan, rings=replace(self._plan.rings, count=n))) for n in counts]
-        errors.append(self._views.error(self._chosen))
-        return Curve("rings", "", [float(n) for n in (*counts, chosen)], errors, float(chosen))
+        errors = [self._of_rings(n) for n in counts]
+        return Curve("rings", "", [float(n) for n in (*counts, chosen)], [*errors, self._chosen], float(chosen))
 
     def azimuths(self) -> Curve:
         """Mean error against the number of azimuths: every eighth, fourth, second and all."""
         chosen = self._plan.azimuths.count
-        skips = [skip for skip in (8, 4, 2, 1) if chosen % (skip * TILE) == 0]
-        errors = [self._error(self._plan, self._spectrum.thinned(skip)) for skip in skips]
-        return Curve("azimuths", "", [float(chosen // skip) for skip in skips], errors, float(chosen))
+        skips = [skip for skip in (8, 4, 2) if chosen % (skip * TILE) == 0]
+        errors = [self._error(self._plan, self._rules, self._spectrum.thinned(skip)) for skip in skips]
+        counts = [float(chosen // skip) for skip in (*skips, 1)]
+        return Curve("azimuths", "", counts, [*errors, self._chosen], float(chosen))
 
     def w_terms(self) -> Curve:
         """Mean error against the Chebyshev terms in |w|."""
         chosen = self._plan.w_terms
         counts = sorted({4, 8, 12, chosen})
-        errors = [self._error(replace(self._plan, w_terms=n)) for n in counts]
+        errors = [self._chosen if n == chosen else self._of_w_terms(n) for n in counts]
         return Curve("terms in |w|", "", [float(n) for n in counts], errors, float(chosen))
 
     def step(self) -> Curve:
@@ -150,22 +152,23 @@ class PolarStudy:
         light, rho = self._config.spectrum, self._plan.rings.rho()
         steps = [1.0, 2.0, 5.0, 10.0, 20.0]
         light_of = brdf.illumination_of(self._config)
-        errors = [self._error(self._plan, rules=quadrature.uniform(light_of(s), len(rho))) for s in steps]
+        errors = [self._error(self._plan, quadrature.uniform(light_of(s), len(rho))) for s in steps]
         low, high = light.range_nm
-        chosen = (high - low) / (float(np.mean(self._rules(rho).count)) - 1.0)
+        chosen = (high - low) / (float(np.mean(self._rules.count)) - 1.0)
         return Curve("wavelength step", "nm", steps, errors, round(chosen, 2))
 
-    def _rules(self, rho: Array) -> RingQuadratures:
+    def _of_rings(self, count: int) -> float:
+        rings = replace(self._plan.rings, count=count)
+        return self._error(replace(self._plan, rings=rings), self._rules_of(rings.rho()))
+
+    def _of_w_terms(self, count: int) -> float:
+        return self._error(replace(self._plan, w_terms=count), self._rules)
+
+    def _rules_of(self, rho: Array) -> RingQuadratures:
         tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
         return quadrature.choose(brdf.illumination_of(self._config), rho, self._spectrum.sigma_um, tolerance)
 
-    def _error(
-        self,
-        planned: plan.Plan,
-        spectrum: PolarSpectrum | None = None,
-        rules: RingQuadratures | None = None,
-    ) -> float:
-        found = self._rules(planned.rings.rho()) if rules is None else rules
+    def _error(self, planned: plan.Plan, rules: RingQuadratures, spectrum: PolarSpectrum | None = None) -> float:
         reflectance = partial(brdf.spectral_reflectance, self._config.material, self._config.spectrum)
-        table = polar.build(spectrum or self._spectrum, planned.rings, found, planned.w_terms, reflectance)
+        table = polar.build(spectrum or self._spectrum, planned.rings, rules, planned.w_terms, reflectance)
         return self._views.error(table_evaluator(table, self._config))

@@ -90,11 +90,17 @@ def integrate(
     else:
         factor = brdf.direction_factor(material, quadrature, wi, wr)
     weights = quadrature.weights * brdf.window_area(material, quadrature, sigma_um)[:, None]
-    sums = power @ weights
+    sums = _sums(power, weights)
     # few directions reach beyond the band: only theirs are summed a second time, without what is unknown
     unknown = np.isnan(sums[:, 0])
-    sums[unknown] = np.nan_to_num(power[unknown]) @ weights
+    sums[unknown] = _sums(np.nan_to_num(power[unknown]), weights)
     return np.asarray(factor[:, None] * sums)
+
+
+def _sums(power: Array, weights: Array) -> Array:
+    """sum_l power_l weights_l (directions, channels) of `power` (directions, L) and `weights` (L, channels)."""
+    # a product of matrices would start threads, which cost more than so few columns
+    return np.stack([np.vecdot(power, channel) for channel in weights.T], axis=-1)
 
 
 class Reference:

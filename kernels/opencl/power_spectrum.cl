@@ -46,18 +46,23 @@ static void window_weights(const double4 d, const double df, const double invers
     }
 }
 
+/* Adds sum_i weight[4 i] cell[i * stride + k], i < count, to low, k < 8, and to high, 8 <= k < 16 */
+static void add(__global const double *cell, const long stride, const double *weight, const int count, double8 *low,
+                double8 *high) {
+    for (int i = 0; i < count; ++i, cell += stride) {
+        *low = fma((double8)weight[4 * i], vload8(0, cell), *low);
+        *high = fma((double8)weight[4 * i], vload8(1, cell), *high);
+    }
+}
+
 /* sum_i weights[i] cells[(start + i) % count], i < count, for cells of `width` doubles, `stride` apart; `lane` picks the weights */
 static void weighted_sum(__global const double *cells, const long stride, const int start, const double4 *weights,
                          const int lane, const int count, const int width, __global double *sum) {
     const double *weight = (const double *)weights + lane;
     for (int k = 0; k < width; k += 16) {
         double8 low = 0.0, high = 0.0;
-        __global const double *cell = cells + start * stride + k;
-        for (int i = 0; i < count; ++i) {
-            low = fma((double8)weight[4 * i], vload8(0, cell), low);
-            high = fma((double8)weight[4 * i], vload8(1, cell), high);
-            cell += start + i + 1 == count ? (1 - count) * stride : stride;
-        }
+        add(cells + start * stride + k, stride, weight, count - start, &low, &high);
+        add(cells + k, stride, weight + 4 * (count - start), start, &low, &high);
         vstore8(low, 0, sum + k);
         vstore8(high, 1, sum + k);
     }

@@ -1,6 +1,8 @@
 """Validate: the table against the exact reference, as numbers, plots and one page."""
 
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ from pipeline.config import Config, TaylorLayout
 from pipeline.device_stack import kernel_digest
 from pipeline.evaluate import Evaluator, table_evaluator
 from pipeline.progress import Progress
-from pipeline.reference import reference_of
+from pipeline.reference import MeanReference, reference_of
 from pipeline.stages import render, spectrum, stack, surface, table
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
 
@@ -28,37 +30,67 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    from pipeline.report import plots, validation_report
+    # one thread draws while the device computes what comes next
+    with ThreadPoolExecutor(1) as drawing:
+        results, drawn = _measured(config, inputs, drawing, progress)
+        pictures = {name: picture.result() for name, picture in drawn.items()}
+    for name, png in pictures.items():
+        (folder / f"{name}.png").write_bytes(png)
+    from pipeline.report import validation_report
 
+    (folder / REPORT).write_text(validation_report.build(config, inputs, results, pictures), encoding="utf-8")
+    return results
+
+
+def _measured(
+    config: Config, inputs: Inputs, drawing: Executor, progress: Progress
+) -> tuple[Summary, dict[str, Future[bytes]]]:
+    """The numbers of the summary, and the pictures by name as `drawing` makes them."""
     field = surface.load(inputs["surface"])
+    drawn = {"surface": drawing.submit(_picture, "height_map", field)}
     evaluate = table_evaluator(table.load(config, inputs["table"]), config)
     reference = reference_of(field, config, progress)
-    lights, radius = config.render.lights, render.map_radius(config)
-    directions = [render.light_direction(light) for light in lights]
-    checks = [validation.check_map(evaluate, reference, config, wi, radius, progress) for wi in directions]
-    coarse = convergence.CoarseMap(reference, config, directions[0], radius)
-    study = _study(config, inputs, evaluate, coarse)
+    radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
+    first = render.light_direction(config.render.lights[0])
+    study = _study(config, inputs, evaluate, convergence.CoarseMap(reference, config, first, radius))
     curves = _curves(study.curves(inputs["table"].summary["wavelengths"] > 1), progress)
-    maps = [
-        {**light.model_dump(), "colour": [asdict(error) for error in check.colour]}
-        for light, check in zip(lights, checks, strict=True)
-    ]
+    drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
+    maps: list[dict[str, Any]] = []
+    for light in config.render.lights:
+        towards, named = render.light_direction(light), f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
+        check = validation.check_map(evaluate, reference, config, towards, radius, progress)
+        picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
+        drawn[f"comparison_{render.map_name(light)}"] = picture
+        maps.append({**light.model_dump(), "colour": [asdict(error) for error in check.colour]})
     results: Summary = {
-        "reference": asdict(validation.check_reference(reference.fields[0], reference.first, config)),
-        "random": asdict(validation.check_random(evaluate, reference, config, progress)),
+        **_on_random_directions(config, inputs, evaluate, reference, progress),
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
     }
-    exposures = config.render.exposure_ru, config.accuracy.exposure_ru
-    pictures = {"surface": plots.height_map(field), "convergence": plots.convergence(curves, exposures[1])}
-    for light, check in zip(lights, checks, strict=True):
-        named = f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
-        pictures[f"comparison_{render.map_name(light)}"] = plots.map_comparison(check, *exposures, named)
-    for name, png in pictures.items():
-        (folder / f"{name}.png").write_bytes(png)
-    (folder / REPORT).write_text(validation_report.build(config, inputs, results, pictures), encoding="utf-8")
-    return results
+    return results, drawn
+
+
+def _picture(of: str, *arguments: Any) -> bytes:
+    """A plot by its function's name; matplotlib takes as long to import as a plot to draw, and only here."""
+    png: bytes = getattr(import_module("pipeline.report.plots"), of)(*arguments)
+    return png
+
+
+def _on_random_directions(
+    config: Config, inputs: Inputs, evaluate: Evaluator, reference: MeanReference, progress: Progress
+) -> Summary:
+    """`random`, the table's errors on random directions, and `reference`, the reference's against sums over samples.
+
+    A table that comes with a certificate was put to the very same two checks for it.
+    """
+    certified = inputs["table"].summary.get("certificate")
+    if certified is not None:
+        return {name: certified[name] for name in ("reference", "random")}
+    return {
+        "reference": asdict(validation.check_reference(reference.fields[0], reference.first, config)),
+        "random": asdict(validation.check_random(evaluate, reference, config, progress)),
+    }
 
 
 def _study(
