@@ -1,9 +1,7 @@
 """`bench`: run time against error of every way to the same pictures."""
 
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,8 +36,8 @@ def bench_command(
 
     The paper's tables over their parameters, the polar table over its own, the same polar table by FINUFFT and both
     in plain numpy, each with its mean CIELAB error at 7500 RU; the stages' shares of the device's peak and
-    bandwidth, which are measured in the same run; and the stack's transforms by the kernel, pyFFTW and scipy.
-    Without CONFIGs: three synthetic surfaces.
+    bandwidth, which are measured in the same run; the stack's transforms by the kernel, pyFFTW and scipy; what each
+    constant of the kernels buys; and what compiling costs. Without CONFIGs: three synthetic surfaces.
     """
     from pipeline.bench import criteria, files, machine
     from pipeline.store import writing
@@ -58,9 +56,11 @@ def bench_command(
             console.note(f"{config.name}:")
             found.append(_surface(config, path, store, quick))
             measured = machine.best(measured, machine.measure())
+        constants = [] if quick else _constants(configs[0], store)
     judged = [c for bench, whole_run_s in found for c in criteria.of_surface(bench, measured, whole_run_s)]
     judged += [*criteria.of_series(judging.criterion(judging.sweep(sweep.tall()))), _large_scan(quick)]
-    results = files.Results(measured, [bench for bench, _ in found], judged)
+    judged += criteria.of_compiling(None if quick else _compiling())
+    results = files.Results(measured, [bench for bench, _ in found], constants, judged)
     written = _write(results, out)
     if as_json:
         console.print_json({**files.document(results), "files": [str(path) for path in written]})
@@ -85,16 +85,53 @@ def _paths(given: tuple[Path, ...]) -> Iterator[tuple[Path, ...]]:
 
 def _surface(config: Any, path: Path, store: Any, quick: bool) -> tuple[Any, float | None]:
     """One surface's measurements, and the seconds of a whole run."""
-    from pipeline import run
     from pipeline.bench import suite
-    from pipeline.stages import surface
 
     with console.showing_progress() as progress:
-        artifacts = run.execute(config, run.plan(config, store, "surface"), store, progress)
-        field = surface.load(store.open("surface", artifacts["surface"].key))
+        field = _field(config, store, progress)
         effort = suite.QUICK if quick else suite.FULL
         found = suite.run(config, field, effort, progress)
         return found, None if quick else _whole_run(path, progress)
+
+
+def _field(config: Any, store: Any, progress: Any) -> Any:
+    """The height field of a config."""
+    from pipeline import run
+    from pipeline.stages import surface
+
+    artifacts = run.execute(config, run.plan(config, store, "surface"), store, progress)
+    return surface.load(store.open("surface", artifacts["surface"].key))
+
+
+def _constants(config: Any, store: Any) -> Any:
+    """What each constant of the kernels buys on a surface."""
+    from pipeline.bench import constants, setting
+    from pipeline.bench.suite import FULL, MAIN
+
+    console.note("constants of the kernels:")
+    with console.showing_progress() as progress:
+        of = setting.make(_field(config, store, progress), config, MAIN)
+        return constants.measure(of, FULL.bakes, progress)
+
+
+def _compiling() -> Any:
+    """What a new machine waits for; None where a run failed."""
+    from pipeline.bench import compiling
+    from pipeline.bench.processes import RunFailedError
+
+    console.note("a new machine:")
+    try:
+        with console.showing_progress() as progress:
+            return compiling.measure(_command_line(), progress)
+    except RunFailedError as error:
+        console.warn(f"a run on a new kernel cache failed: {error}")
+        return None
+
+
+def _command_line() -> Any:
+    from pipeline.bench.processes import CommandLine
+
+    return CommandLine((sys.executable, "-c", _PROCESS))
 
 
 def _whole_run(path: Path, progress: Any) -> float | None:
@@ -102,22 +139,16 @@ def _whole_run(path: Path, progress: Any) -> float | None:
 
     The first fills the kernel cache; the fastest of the others counts.
     """
-    seconds = []
-    for i in range(_WHOLE_RUNS):
-        with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-c", _PROCESS, "run", str(path), "--until", "table"]
-            started = time.perf_counter()
-            done = subprocess.run(
-                [*command, "--store", f"{folder}/store", "--out", f"{folder}/out"],
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            seconds.append(time.perf_counter() - started)
-        if done.returncode != 0:
-            console.warn(f"{path}: run --until table failed: {done.stderr.strip().splitlines()[-1]}")
-            return None
-        progress("whole runs", (i + 1) / _WHOLE_RUNS)
+    from pipeline.bench.processes import RunFailedError
+
+    seconds: list[float] = []
+    try:
+        for i in range(_WHOLE_RUNS):
+            seconds.append(_command_line().run(path, until="table").seconds)
+            progress("whole runs", (i + 1) / _WHOLE_RUNS)
+    except RunFailedError as error:
+        console.warn(f"{path}: run --until table failed: {error}")
+        return None
     return min(seconds[1:])
 
 
@@ -158,6 +189,12 @@ def _tell(results: Any) -> None:
     )
     for surface in results.surfaces:
         _tell_surface(surface, machine)
+    if results.constants:
+        click.echo("")
+        console.print_table(
+            ["kernels' constant", "value", "time", "instead", "time", "buys"],
+            [_constant_row(constant) for constant in results.constants],
+        )
     click.echo("\nCriteria")
     console.print_table(
         ["surface", "no.", "what", "measured", "asked", "verdict", ""],
@@ -213,6 +250,19 @@ def _transforms_row(of: Any) -> list[str]:
     for seconds, difference in ((of.fftw_s, of.fftw_difference), (of.scipy_s, of.scipy_difference)):
         row += [f"{1e3 * seconds:.0f} ms", f"{seconds / of.kernel_s:.1f} x", f"{difference:.0e}"]
     return row
+
+
+def _constant_row(constant: Any) -> list[str]:
+    """A constant's kernels with its value and with another, and the share of their time that it saves."""
+    here, other = constant.seconds, constant.other_s
+    return [
+        constant.name,
+        f"{constant.value}",
+        f"{1e3 * here:.1f} ms",
+        f"{constant.other_value}",
+        f"{1e3 * other:.1f} ms",
+        f"{100.0 * (1.0 - here / other):.0f} %",
+    ]
 
 
 def _point_row(point: Any) -> list[str]:

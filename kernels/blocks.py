@@ -11,26 +11,37 @@ from contextlib import contextmanager
 from kernels import device
 
 # By the floats of a vector register. dft_stack: STEP_X and STEP_Y of the first step's k1, with sums of two and of
-# four vectors, and KEPT frequencies of the second step, with two. polar_spectrum: S_BLOCK nodes in s, with four, and
-# RADII neighbours, whose windows share most of what they read. spectral_operator: W_BLOCK nodes of w with two
-# vectors, and SHARE_BLOCK nodes of w with six.
+# four vectors, and KEPT frequencies of the second step, with two. polar_spectrum: S_BLOCK nodes in s, with four.
+# spectral_operator: W_BLOCK nodes of w with two vectors, and SHARE_BLOCK nodes of w with six.
 _BY_WIDTH = {
-    16: {"STEP_X": 10, "STEP_Y": 5, "KEPT": 10, "S_BLOCK": 4, "RADII": 8, "W_BLOCK": 8, "SHARE_BLOCK": 4},
-    8: {"STEP_X": 3, "STEP_Y": 2, "KEPT": 3, "S_BLOCK": 1, "RADII": 8, "W_BLOCK": 4, "SHARE_BLOCK": 1},
-    4: {"STEP_X": 2, "STEP_Y": 1, "KEPT": 2, "S_BLOCK": 1, "RADII": 8, "W_BLOCK": 4, "SHARE_BLOCK": 1},
+    16: {"STEP_X": 10, "STEP_Y": 5, "KEPT": 10, "S_BLOCK": 4, "W_BLOCK": 8, "SHARE_BLOCK": 4},
+    8: {"STEP_X": 3, "STEP_Y": 2, "KEPT": 3, "S_BLOCK": 1, "W_BLOCK": 4, "SHARE_BLOCK": 1},
+    4: {"STEP_X": 2, "STEP_Y": 1, "KEPT": 2, "S_BLOCK": 1, "W_BLOCK": 4, "SHARE_BLOCK": 1},
 }
+# polar_spectrum: neighbouring RADII share most of what their windows read; USUAL_TAPS, 2 reach_x + 1 of a patch of
+# four sigma, is the width of a window whose loop along x is written out. 1 and 0 are without either.
+_OF_ALL = {"RADII": 8, "USUAL_TAPS": 7}
+_WITHOUT = {"RADII": 1, "USUAL_TAPS": 0}
 _instead: dict[str, int] = {}
 
 
 def of_device() -> dict[str, int]:
     """Every block size for the default device, by the constant's name in the kernels."""
-    return _BY_WIDTH[device.default_device().vector_width] | _instead
+    return _BY_WIDTH[device.default_device().vector_width] | _OF_ALL | _instead
 
 
 def chosen(*names: str) -> dict[str, int]:
     """Some of them, as constants of a program."""
     blocks = of_device()
     return {name: blocks[name] for name in names}
+
+
+def other_value(name: str) -> int:
+    """Another value to hold a constant against: that for registers of another width, or that without it."""
+    if name in _WITHOUT:
+        return _WITHOUT[name]
+    width = device.default_device().vector_width
+    return _BY_WIDTH[8 if width == 16 else 16][name]
 
 
 @contextmanager

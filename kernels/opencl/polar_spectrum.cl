@@ -18,15 +18,15 @@
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
  * the point. One work-item, RADII radii and the sixteen azimuths of a tile.
  *
- * Given at launch: terms, even, in so many `blocks` of 16; s_nodes, at least S_BLOCK; reach_x and reach_y. Set by the host: RADII;
- * S_BLOCK, nodes whose sums stay in registers; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
+ * Given at launch: terms, even; the stack's blocks; s_nodes, at least S_BLOCK; reach_x and reach_y. Set by the host:
+ * RADII; S_BLOCK, nodes whose sums stay in registers; USUAL_TAPS, the width of a window whose loop along x is written
+ * out; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
 #define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
 #define INLINE __attribute__((always_inline))
-#define USUAL_TAPS 7  /* 2 reach_x + 1 of a patch of four sigma: these loops are written out, which saves a sixth */
 
 /* E is larger than caches: lines written past them need not be read first */
 #if defined(__has_builtin)

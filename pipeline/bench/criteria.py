@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from pipeline.bench.compiling import Compiling
 from pipeline.bench.machine import Machine, share
 from pipeline.bench.paper import RESOLUTION, STEP_NM
 from pipeline.bench.suite import MAIN, NUFFT, NUMPY_POLAR, PAPER, POLAR, TEXTURES, SurfaceBench, settings_of
@@ -54,6 +55,20 @@ def of_surface(bench: SurfaceBench, machine: Machine, whole_run_s: float | None)
 def of_large_scan(peak_bytes: int | None) -> Criterion:
     measured = None if peak_bytes is None else peak_bytes / _GIB
     return Criterion("4096^2", "4", "peak memory at 64 terms", measured, "<", 3.0, "GiB")
+
+
+def of_compiling(costs: Compiling | None) -> list[Criterion]:
+    """What a new machine waits for."""
+    asked = (
+        ("compiling for the first config", "first_s", 3.0, "s CPU", "run --until table, kernels cold less warm"),
+        ("compiling for the next config", "next_s", 1.0, "s CPU", "other terms, nodes, terms in |w| and reach"),
+        ("first bake, kernels cold", "first_bake_s", 20.0, "s", "configs/elaphe.toml, two lights, with its bundle"),
+        ("second bake", "second_bake_s", 8.0, "s", "configs/xenopeltis.toml, two lights, with its bundle"),
+    )
+    return [
+        Criterion("new machine", "7", what, getattr(costs, key, None), "<=", limit, unit, remark)
+        for what, key, limit, unit, remark in asked
+    ]
 
 
 def of_series(found: judging.Criterion) -> list[Criterion]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pipeline.bench.constants import Constant
 from pipeline.bench.criteria import Criterion
 from pipeline.bench.machine import Machine, share
 from pipeline.bench.suite import SurfaceBench
@@ -32,10 +33,11 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Results:
-    """One run of the bench on one machine."""
+    """One run of the bench on one machine; constants: of the first surface's kernels, empty where not measured."""
 
     machine: Machine
     surfaces: list[SurfaceBench]
+    constants: list[Constant]
     criteria: list[Criterion]
 
 
