@@ -5,7 +5,7 @@ Two routes to the same number:
 - `power_direct` adds up the samples one by one, float64, no series, no table. Slow and obviously right.
 - `Reference` serves maps in bearable time. It expands exp(i k w h) in Chebyshev polynomials (Jacobi-Anger, terms to
   2e-11 of the mirror), transforms each once, and gathers the window's neighbourhood, cut at the same share, per
-  direction and wavelength on the device, in float64.
+  direction and wavelength on the device, in float64. Directions of one v, such as a map's rows, share sums.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +27,7 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
 STEP_NM = FINE_STEP_NM
-# in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11, at half the time
+# in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11
 _TOLERANCE = 2e-11
 _DIRECTIONS_AT_ONCE = 8192
 _ROWS_AT_ONCE = 32

@@ -71,6 +71,16 @@ def test_a_run_leaves_maps_a_report_and_a_bundle(first: Tool) -> None:
     assert "certificate" in (first.out / "small" / "report.html").read_text(encoding="utf-8")
 
 
+def test_validation_tells_the_errors_of_the_certificate(first: Tool) -> None:
+    """The table was put to the checks on random directions once, for its certificate, and not again."""
+    made = first("run", first.folder / "small.toml", "--json").json[0]["stages"]
+    certified, told = made["table"]["summary"]["certificate"], made["validate"]["summary"]
+    assert told["random"] == certified["random"]
+    assert told["reference"] == certified["reference"]
+    at_exposure = [e["mean"] for e in told["random"]["colour"] if e["exposure_ru"] == certified["exposure_ru"]]
+    assert at_exposure == [certified["measured"]]
+
+
 def test_a_second_illuminant_reuses_the_power_spectrum(polar: Tool) -> None:
     told = states(polar, write(polar, spectrum={"illuminant": "A"}))
     assert [told[stage] for stage in STAGES] == ["cached", "cached", "to do", "to do", "to do"]

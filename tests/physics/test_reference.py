@@ -75,9 +75,17 @@ def test_direct_sum_is_the_sum_over_samples_and_copies_as_written() -> None:
         (rough(48, 90, (0.13, 0.09), 0.35), 1.5),
         (rough(65, 33, (0.1, 0.1), 0.05), 6.0),
         (rough(80, 80, (0.1, 0.1), 2.0), 0.3),
+        (rough(40, 40, (0.1, 0.1), 10.0), 0.3),
         (HeightField(np.zeros((32, 32)), (0.1, 0.1)), 1.0),
     ],
-    ids=["square", "oblong", "odd, window over many copies", "4 um tall, window of three pixels", "flat"],
+    ids=[
+        "square",
+        "oblong",
+        "odd, window over many copies",
+        "4 um tall, window of three pixels",
+        "20 um tall",
+        "flat",
+    ],
 )
 def test_fast_route_agrees_with_the_direct_sum(field: HeightField, sigma: float) -> None:
     """Jacobi-Anger and the gather against the plain sum, to 1e-9 of the mirror, all wavelengths."""
