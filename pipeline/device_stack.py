@@ -21,6 +21,6 @@ def upload(built: Stack) -> diffraction.DeviceStack:
     )
 
 
-def kernel_digest(name: str) -> str:
-    """Digest of a diffraction kernel's source, the windowed DFT that all of them share included."""
-    return digest.of_json([device.source("windowed_dft.cl"), device.source(name)])
+def kernel_digest(*names: str) -> str:
+    """Digest of the sources of kernels, by their files' names."""
+    return digest.of_json([device.source(name) for name in names])

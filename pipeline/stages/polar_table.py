@@ -25,7 +25,7 @@ _FILE = "table.zarr"
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernels": [*spectrum.planning_kernels(), kernel_digest("power_spectrum.cl")],
+        "kernels": kernel_digest(*spectrum.PLANNING_KERNELS, "power_spectrum.cl"),
         "spectrum": spectrum_parameters(config),
         # the certificate is over colours, so all of the material counts
         "material": material_parameters(config),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import device
-from pipeline import arrays, digest, spectrum, windows
+from pipeline import arrays, spectrum, windows
 from pipeline.config import Config, LaserLine, PolarLayout
 from pipeline.device_stack import kernel_digest
 from pipeline.progress import Progress
@@ -19,6 +19,8 @@ from pipeline.tables import plan
 from pipeline.tables.polar_grid import Azimuths, Rings
 
 _FILE = "spectrum.zarr"
+# from the stack to tables of a spectrum: the plan measures with them
+PLANNING_KERNELS = ("dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl")
 # by its key, what this process made last: the table that follows takes longer to read it back than to use it
 _just_made: dict[str, spectrum.PolarSpectrum] = {}
 
@@ -31,7 +33,7 @@ def layout_of(config: Config) -> PolarLayout:
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernel": [kernel_digest("polar_spectrum.cl"), *planning_kernels()],
+        "kernel": kernel_digest("polar_spectrum.cl", *PLANNING_KERNELS),
         "coherence": config.coherence.model_dump(mode="json"),
         "wavelengths": _wavelengths(config),
         "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
@@ -39,12 +41,6 @@ def _parameters(config: Config) -> dict[str, Any]:
         "delta_e": config.budget_delta_e,
         "exposure_ru": config.accuracy.exposure_ru,
     }
-
-
-def planning_kernels() -> list[str]:
-    """Digests of the kernels from the stack to tables of a spectrum: the plan measures with them."""
-    names = "dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl"
-    return [digest.of_json(device.source(name)) for name in names]
 
 
 def _wavelengths(config: Config) -> dict[str, Any]:

@@ -21,7 +21,7 @@ _FILE = "table.zarr"
 def _parameters(config: Config) -> dict[str, Any]:
     material = material_parameters(config)
     return {
-        "kernel": kernel_digest("taylor_table.cl"),
+        "kernel": kernel_digest("windowed_dft.cl", "taylor_table.cl"),
         "spectrum": spectrum_parameters(config),
         # angles stay outside the table: only what varies with wavelength enters
         "material": {key: material[key] for key in ("normalisation", "metal")},
