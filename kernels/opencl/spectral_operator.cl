@@ -187,14 +187,20 @@ ALONG_LINE(half_block_between_radii, __private, 4)
 /* E of a point between ORDER radii, at every node in s, for both tiles */
 static void between_radii(__global const float *here, __global const float *opposite, const int first,
                           __global const float *along_r, const int s_nodes, float *e_here, float *e_opposite) {
+    __global const float *row_here[ORDER], *row_opposite[ORDER];
+    ROLLED for (int k = 0; k < ORDER; ++k) {
+        /* below the origin, the half turns change places */
+        const int i = first + k;
+        const long row = 16L * abs(i) * s_nodes;
+        row_here[k] = row + (i < 0 ? opposite : here);
+        row_opposite[k] = row + (i < 0 ? here : opposite);
+    }
     for (int j = 0; j < s_nodes; ++j) {
         float16 a = 0.0f, b = 0.0f;
         UNROLL for (int k = 0; k < ORDER; ++k) {
-            const int i = first + k;
-            const long row = (long)abs(i) * s_nodes + j;
             const float16 weight = along_r[k];
-            a = fma(weight, vload16(row, i < 0 ? opposite : here), a);
-            b = fma(weight, vload16(row, i < 0 ? here : opposite), b);
+            a = fma(weight, vload16(j, row_here[k]), a);
+            b = fma(weight, vload16(j, row_opposite[k]), b);
         }
         vstore16(a, j, e_here);
         vstore16(b, j, e_opposite);
