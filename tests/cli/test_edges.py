@@ -20,6 +20,7 @@ def test_collect_leaves_what_is_no_artifact_alone(tool: Tool) -> None:
     assert mine.read_text(encoding="utf-8") == "precious"
 
 
+@pytest.mark.slow
 def test_a_budget_at_any_exposure(copy: Tool) -> None:
     result = copy("run", copy.config(accuracy={"delta_e": 50.0, "exposure_ru": 1500}))
     assert result.code == 0, result.stderr
@@ -128,6 +129,7 @@ def test_a_recipe_is_checked_before_the_first_config_is_baked(tool: Tool) -> Non
     assert tool.artifacts() == {}
 
 
+@pytest.mark.slow
 def test_publish_warns_as_run_does(tool: Tool) -> None:
     surface = {"recipe": {"kind": "sinusoid", "amplitude_um": 0.02, "size_um": 10, "pitch_um": 0.2}}
     result = tool("publish", tool.config(surface=surface))

@@ -22,6 +22,7 @@ def test_every_config_bakes(tool: Tool, published: Path, path: Path) -> None:
     assert tool("verify", tool.bundle(name)).code == 0
 
 
+@pytest.mark.slow
 def test_several_configs_bake_in_one_command(copy: Tool) -> None:
     """In their order; the second is the first under another name."""
     result = copy("run", "small.toml", copy.config("other.toml", name="other"), "--json")

@@ -59,7 +59,7 @@ def test_long_periods_keep_their_energy() -> None:
         assert energy.closed_albedo(grating, np.array([0.3]), 60.0)[0] == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.parametrize("way", [Exact, PolarTableMethod])
+@pytest.mark.parametrize("way", [Exact, pytest.param(PolarTableMethod, marks=pytest.mark.slow)])
 def test_light_and_view_may_change_places(way) -> None:
     surface = small("elaphe")
     gold = Material(fresnel="conductor", normalisation="absolute")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.config import Config
+from pipeline.config import Config, Spectrum
 from pipeline.methods.catalogue import METHODS
 from pipeline.methods.method import Monochromatic, monochromatic_brdf
 from pipeline.optics import geometry
@@ -56,8 +56,10 @@ def test_it_integrates_to_the_colour(material):
 
 
 def test_methods_without_one_wavelength_say_so():
+    # what they are does not depend on how many wavelengths they are made of
+    config = config_of().model_copy(update={"spectrum": Spectrum(range_nm=(540.0, 560.0))})
     for name in ("NMM", "GPU Gems", "D14 look-up"):
-        method = METHODS[name](grating(), config_of())
+        method = METHODS[name](grating(), config)
         assert not isinstance(method, Monochromatic)
 
 

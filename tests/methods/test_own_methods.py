@@ -58,6 +58,7 @@ def test_exact_keeps_its_dfts() -> None:
     assert 0.9 < kept / (columns * rows * 2 * 8 * 24) < 1.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fresnel", ["schlick", "conductor"])
 def test_the_table_keeps_its_budget(fresnel: str) -> None:
     """Mean CIELAB error at 7500 RU over a map: planned for 0.1, and not twice that where the map is unlucky."""
