@@ -53,6 +53,7 @@ def test_it_is_the_tools_look_up(
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fresnel", "normalisation"), [("schlick", "relative"), ("conductor", "absolute")])
 def test_it_is_the_tools_polar_look_up(bake: Baker, tmp_path: Path, fresnel: str, normalisation: str) -> None:
     config = small("polar", material={"fresnel": fresnel, "normalisation": normalisation})

@@ -10,6 +10,8 @@ import pytest
 
 from tests.cli.tool import SMALL, Tool, leavings, toml
 
+pytestmark = pytest.mark.slow
+
 STAGES = ["surface", "spectrum", "table", "render", "validate"]
 POLAR: dict[str, Any] = {
     **SMALL,
