@@ -14,9 +14,9 @@ from kernels import device
 # four vectors, and KEPT frequencies of the second step, with two. polar_spectrum: S_BLOCK nodes in s, with four.
 # spectral_operator: W_BLOCK nodes of w with two vectors, and SHARE_BLOCK nodes of w with six.
 _BY_WIDTH = {
-    16: {"STEP_X": 10, "STEP_Y": 5, "KEPT": 10, "S_BLOCK": 4, "W_BLOCK": 8, "SHARE_BLOCK": 4},
-    8: {"STEP_X": 3, "STEP_Y": 2, "KEPT": 3, "S_BLOCK": 1, "W_BLOCK": 4, "SHARE_BLOCK": 1},
-    4: {"STEP_X": 2, "STEP_Y": 1, "KEPT": 2, "S_BLOCK": 1, "W_BLOCK": 4, "SHARE_BLOCK": 1},
+    16: {"STEP_X": 5, "STEP_Y": 4, "KEPT": 6, "S_BLOCK": 4, "W_BLOCK": 4, "SHARE_BLOCK": 2},
+    8: {"STEP_X": 2, "STEP_Y": 1, "KEPT": 2, "S_BLOCK": 1, "W_BLOCK": 2, "SHARE_BLOCK": 1},
+    4: {"STEP_X": 1, "STEP_Y": 1, "KEPT": 1, "S_BLOCK": 1, "W_BLOCK": 1, "SHARE_BLOCK": 1},
 }
 # polar_spectrum: neighbouring RADII share most of what their windows read; USUAL_TAPS, 2 reach_x + 1 of a patch of
 # four sigma, is the width of a window whose loop along x is written out. 1 and 0 are without either.

@@ -146,8 +146,8 @@ static void gather_azimuth(__global const float *stack, const int columns, const
     ROLLED for (int b = 0; b < blocks; ++b) {
         __global const float *corner = stack + first * cell + 16 * b;
         float16 *re_b = f_n + 16 * b + lane, *im_b = re_b + 16 * blocks;
-        if (taps_x == USUAL_TAPS)
-            gather(corner, columns, cell, USUAL_TAPS, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
+        if (taps_x == USUAL_TAPS && cell == 32)
+            gather(corner, columns, 32, USUAL_TAPS, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
         else
             gather(corner, columns, cell, taps_x, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
     }
@@ -188,15 +188,17 @@ __kernel void polar_spectrum(__global const float *stack, __global const float *
     Window window[RADII];
     ROLLED for (int i = 0; i < count; ++i)
         place_window(grid, decay, azimuth + 32 * tile, radius[first + i], fx_max, fy_max, reach_x, reach_y, window + i);
-    /* of every radius: real parts, then imaginary parts */
-    float16 f_n[RADII * 2 * MOST_BLOCKS * 16];
+    /* of every radius: real parts, then imaginary parts; radii lie apart by an odd number of pairs of cache lines, or
+     * those of one azimuth would drive each other, and the stack, out of the nearest cache */
+    float16 f_n[RADII * (2 * MOST_BLOCKS * 16 + 2)];
+    const int apart = 32 * blocks + 2;
     /* radii inside: the next one's window lies in almost the same cells */
     ROLLED for (int lane = 0; lane < 16; ++lane)
         ROLLED for (int i = 0; i < count; ++i)
-            gather_azimuth(stack, grid.columns, blocks, taps_x, taps_y, window + i, lane, f_n + 32 * blocks * i);
-    ROLLED for (int part = 0; part < 2 * blocks * count; ++part) transpose(f_n + 16 * part);
+            gather_azimuth(stack, grid.columns, blocks, taps_x, taps_y, window + i, lane, f_n + apart * i);
     ROLLED for (int i = 0; i < count; ++i) {
-        const float16 *re = f_n + 32 * blocks * i, *im = re + 16 * blocks;
+        float16 *re = f_n + apart * i, *im = re + 16 * blocks;
+        ROLLED for (int part = 0; part < 2 * blocks; ++part) transpose(re + 16 * part);
         ROLLED for (int s = 0; s < s_nodes; s += S_BLOCK) {
             /* the last block begins earlier where nodes fill no whole one */
             const int node = min(s, s_nodes - S_BLOCK);

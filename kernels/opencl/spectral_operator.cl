@@ -17,8 +17,8 @@
  * from the polynomial through these.
  *
  * Given at launch: s_nodes, and w_terms, a multiple of 4. Set by the host: ORDER (even); MOST_RINGS of a group;
- * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps; W_BLOCK (4 or 8) and SHARE_BLOCK (1, 2 or 4), nodes
- * of w whose sums stay in registers.
+ * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps; W_BLOCK and SHARE_BLOCK (1, 2 or 4), nodes of w
+ * whose sums stay in registers.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
@@ -142,47 +142,28 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
                      w_terms, shares + (long)rings[i].shares * 3 * w_terms, span + i);
 }
 
-/* G of one point at BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
+/* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
  * radii, from what was interpolated: OpenCL C asks for a function each. */
-#define ALONG_LINE(name, memory, BLOCK)                                                                                \
+#define ALONG_LINE(name, memory)                                                                                       \
     static void name(memory const float *here, memory const float *opposite, __global const float *along_s,            \
                      const int s_nodes, const int w_terms, float16 (*line)[2]) {                                       \
-        float16 sum[BLOCK][2];                                                                                         \
-        UNROLL for (int m = 0; m < BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                           \
+        float16 sum[W_BLOCK][2];                                                                                       \
+        UNROLL for (int m = 0; m < W_BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                         \
         for (int j = 0; j < s_nodes; ++j) {                                                                            \
             const float16 a = vload16(j, here), b = vload16(j, opposite);                                              \
-            UNROLL for (int m = 0; m < BLOCK; ++m) {                                                                   \
+            UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                 \
                 const float16 c = along_s[j * w_terms + m];                                                            \
                 sum[m][0] = fma(c, a, sum[m][0]);                                                                      \
                 sum[m][1] = fma(c, b, sum[m][1]);                                                                      \
             }                                                                                                          \
         }                                                                                                              \
-        UNROLL for (int m = 0; m < BLOCK; ++m) {                                                                       \
+        UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                     \
             line[m][0] = sum[m][0];                                                                                    \
             line[m][1] = sum[m][1];                                                                                    \
         }                                                                                                              \
     }
-ALONG_LINE(block_on_radius, __global, W_BLOCK)
-ALONG_LINE(block_between_radii, __private, W_BLOCK)
-#if W_BLOCK == 8
-ALONG_LINE(half_block_on_radius, __global, 4)
-ALONG_LINE(half_block_between_radii, __private, 4)
-#endif
-
-/* G of one point at every node of w: whole blocks, and half a one where it is left over */
-#define ALL_BLOCKS(kind, here, opposite, weights, line)                                                                \
-    do {                                                                                                               \
-        int m = 0;                                                                                                     \
-        for (; m + W_BLOCK <= w_terms; m += W_BLOCK)                                                                   \
-            block_##kind(here, opposite, weights + m, s_nodes, w_terms, line + m);                                     \
-        HALF_BLOCK(kind, here, opposite, weights, line)                                                                \
-    } while (0)
-#if W_BLOCK == 8
-#define HALF_BLOCK(kind, here, opposite, weights, line)                                                                \
-    if (m < w_terms) half_block_##kind(here, opposite, weights + m, s_nodes, w_terms, line + m);
-#else
-#define HALF_BLOCK(kind, here, opposite, weights, line)
-#endif
+ALONG_LINE(block_on_radius, __global)
+ALONG_LINE(block_between_radii, __private)
 
 /* E of a point between ORDER radii, at every node in s, for both tiles */
 static void between_radii(__global const float *here, __global const float *opposite, const int first,
@@ -240,11 +221,13 @@ static void take_line(const Group group, const int from, const int to, __global 
         __global const float *weights = along_s + (long)p * s_nodes * w_terms;
         if (group.on_radii) {
             const long row = (long)place[p] * s_nodes * 16;
-            ALL_BLOCKS(on_radius, here + row, opposite + row, weights, line);
+            for (int m = 0; m < w_terms; m += W_BLOCK)
+                block_on_radius(here + row, opposite + row, weights + m, s_nodes, w_terms, line + m);
         } else {
             float e_here[16 * MOST_S_NODES], e_opposite[16 * MOST_S_NODES];
             between_radii(here, opposite, place[p], along_r + p * ORDER, s_nodes, e_here, e_opposite);
-            ALL_BLOCKS(between_radii, e_here, e_opposite, weights, line);
+            for (int m = 0; m < w_terms; m += W_BLOCK)
+                block_between_radii(e_here, e_opposite, weights + m, s_nodes, w_terms, line + m);
         }
     }
 }
