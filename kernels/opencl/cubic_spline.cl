@@ -11,6 +11,7 @@
  */
 
 #define UNROLL _Pragma("unroll")
+#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
 #define Z (-0.26794919f)
 #define Z2 (Z * Z)
 #define Z4 (Z2 * Z2)
@@ -25,7 +26,7 @@
     static void name(float16 *line, const int vectors) {                                                               \
         const float q = zn / (1.0f + zn * zn);                                                                         \
         float16 a = 0.0f, x = line[0];                                                                                 \
-        for (int i = 0; i < vectors; ++i) {                                                                            \
+        ROLLED for (int i = 0; i < vectors; ++i) {                                                                     \
             const float16 b = i + 1 < vectors ? line[i + 1] : (float16)0.0f;                                           \
             line[i] = fma((float16)q, before + after, x);                                                              \
             a = x;                                                                                                     \
@@ -45,17 +46,17 @@ __kernel void filter_azimuths(__global float *table, const int azimuths) {
     const float gain = sqrt(3.0f) * (1.0f - Z2) * (1.0f + Z2) * (1.0f + Z4) * (1.0f + Z8) * (1.0f + Z8 * Z8);
     const float16 first = vload16(0, row);
     float16 before = vload16(vectors - 1, row), line[BLOCK + 2];
-    for (int from = 0; from < vectors; from += BLOCK) {
+    ROLLED for (int from = 0; from < vectors; from += BLOCK) {
         const int count = min(BLOCK, vectors - from);
         line[0] = before;
-        for (int i = 0; i < count; ++i) line[i + 1] = vload16(from + i, row);
+        ROLLED for (int i = 0; i < count; ++i) line[i + 1] = vload16(from + i, row);
         line[count + 1] = from + count < vectors ? vload16(from + count, row) : first;
         before = line[count];
         factor_8(line, count + 2);
         factor_4(line, count + 2);
         factor_2(line, count + 2);
         factor_1(line, count + 2);
-        for (int i = 0; i < count; ++i) vstore16(gain * line[i + 1], from + i, row);
+        ROLLED for (int i = 0; i < count; ++i) vstore16(gain * line[i + 1], from + i, row);
     }
 }
 
@@ -74,18 +75,18 @@ __kernel void filter_rings(__global float *table, const int rings) {
     __global float *here = table + (2 * output * tiles + tile) * 16, *there = here + tiles * 16;
 
     float16 a = 0.0f, b = 0.0f;
-    for (int i = -AHEAD; i < 0; ++i) {
+    ROLLED for (int i = -AHEAD; i < 0; ++i) {
         int opposite;
         const long row = ring * ring_of(i, rings, &opposite);
         a = fma((float16)Z, a, vload16(row, there));
         b = fma((float16)Z, b, vload16(row, here));
     }
-    for (int from = 0; from < rings; from += RINGS) {
+    ROLLED for (int from = 0; from < rings; from += RINGS) {
         const int count = min(RINGS, rings - from), seen = min(RINGS + AHEAD, rings - from);
         float16 out[RINGS + AHEAD + 1][2];
         out[0][0] = a;
         out[0][1] = b;
-        for (int i = 0; i < seen; ++i) {
+        ROLLED for (int i = 0; i < seen; ++i) {
             out[i + 1][0] = fma((float16)Z, out[i][0], vload16(ring * (from + i), here));
             out[i + 1][1] = fma((float16)Z, out[i][1], vload16(ring * (from + i), there));
         }
@@ -95,7 +96,7 @@ __kernel void filter_rings(__global float *table, const int rings) {
             a_back = (Z * out[seen - 1][0] + Z2 * out[seen][0]) / (Z2 - 1.0f);
             b_back = (Z * out[seen - 1][1] + Z2 * out[seen][1]) / (Z2 - 1.0f);
         }
-        for (int i = seen - 1; i >= 0; --i) {
+        ROLLED for (int i = seen - 1; i >= 0; --i) {
             a_back = Z * (a_back - out[i + 1][0]);
             b_back = Z * (b_back - out[i + 1][1]);
             if (i < count) {
@@ -135,26 +136,27 @@ __kernel void look_up(__global const float *table, const int rings, const int az
     const float4 across = spline(at.x), along = spline(at.y);
     long taken[16];
     float weight[16];
-    for (int i = 0; i < 4; ++i) {
+    ROLLED for (int i = 0; i < 4; ++i) {
         int opposite;
         const long ring = ring_of(below.x - 1 + i, rings, &opposite);
         const int first = below.y - 1 + (opposite ? azimuths / 2 : 0) + azimuths;
-        for (int j = 0; j < 4; ++j) {
+        ROLLED for (int j = 0; j < 4; ++j) {
             taken[4 * i + j] = ring * 3 * w_terms * azimuths + (first + j) % azimuths;
             weight[4 * i + j] = ((const float *)&across)[i] * ((const float *)&along)[j];
         }
     }
     float xyz[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    for (int c = 0; c < 3; ++c) {
+    ROLLED for (int c = 0; c < 3; ++c) {
         /* Clenshaw's recurrence */
         __global const float *channel = table + (long)c * w_terms * azimuths;
         float b1 = 0.0f, b2 = 0.0f;
-        for (int k = w_terms - 1; k > 0; --k) {
-            const float b = 2.0f * at.z * b1 - b2 + between(channel + (long)k * azimuths, taken, weight);
+        ROLLED for (int k = w_terms - 1; k >= 0; --k) {
+            const float x = k > 0 ? 2.0f * at.z : at.z;
+            const float b = x * b1 - b2 + between(channel + (long)k * azimuths, taken, weight);
             b2 = b1;
             b1 = b;
         }
-        xyz[c] = at.z * b1 - b2 + between(channel, taken, weight);
+        xyz[c] = b1;
     }
     value[get_global_id(0)] = vload4(0, xyz);
 }

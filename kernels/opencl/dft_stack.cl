@@ -23,7 +23,7 @@
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
+#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
 #define INLINE __attribute__((always_inline))
 #define JOIN(a, b) a##b
 #define NAME(a, b) JOIN(a, b)
@@ -63,7 +63,7 @@ static void terms_of(const double8 t, const int first, __global REAL *out) {
 /* Samples n1 = 0 .. and their mirror images N1 - n1, `stride` apart: their sums and differences, `parts` vectors each. */
 static INLINE void pair(__global const VECTOR *sample, const long stride, const Axis axis, const int parts, VECTOR *sum,
                         VECTOR *difference) {
-    for (int n1 = 0; n1 < axis.pairs; ++n1) {
+    ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1) {
         const int alone = n1 == 0 || 2 * n1 == axis.n1;
         UNROLL for (int part = 0; part < parts; ++part) {
             const VECTOR here = sample[n1 * stride + part];
@@ -80,7 +80,7 @@ static INLINE void sums_over_n1(const VECTOR *sum, const VECTOR *difference, __g
                                 VECTOR *s) {
     VECTOR even[2 * MOST_STEP], odd[2 * MOST_STEP];
     UNROLL for (int j = 0; j < parts * step; ++j) even[j] = odd[j] = 0;
-    for (int n1 = 0; n1 < axis.pairs; ++n1)
+    ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1)
         UNROLL for (int j = 0; j < step; ++j) {
             const VECTOR c_j = cosine[n1 * axis.padded + j], s_j = sine[n1 * axis.padded + j];
             UNROLL for (int part = 0; part < parts; ++part) {
@@ -111,10 +111,10 @@ static INLINE void store_pair(const VECTOR *c, const VECTOR *s, const int k1, co
 /* The first step: A[k1][n2] of every k1 and n2, as (re, im) pairs; `parts` 1 for real samples, 2 for complex ones. */
 static INLINE void first_step(__global const VECTOR *sample, __global const REAL *cosine, __global const REAL *sine,
                               const Axis axis, const int parts, const int step, __global VECTOR *a) {
-    for (int n2 = 0; n2 < axis.n2; ++n2) {
+    ROLLED for (int n2 = 0; n2 < axis.n2; ++n2) {
         VECTOR sum[2 * MOST_PAIRS], difference[2 * MOST_PAIRS];
         pair(sample + parts * n2, parts * axis.n2, axis, parts, sum, difference);
-        for (int k = 0; k < axis.pairs; k += step) {
+        ROLLED for (int k = 0; k < axis.pairs; k += step) {
             VECTOR c[2 * MOST_STEP], s[2 * MOST_STEP];
             sums_over_n1(sum, difference, cosine + k, sine + k, axis, parts, step, c, s);
             ROLLED for (int j = 0; j < step; ++j) store_pair(c + parts * j, s + parts * j, k + j, n2, axis, parts, a);
@@ -126,7 +126,7 @@ static INLINE void first_step(__global const VECTOR *sample, __global const REAL
 static void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[2]) {
     VECTOR re[KEPT], im[KEPT];
     UNROLL for (int q = 0; q < KEPT; ++q) re[q] = im[q] = 0;
-    for (int n2 = 0; n2 < n2s; ++n2) {
+    ROLLED for (int n2 = 0; n2 < n2s; ++n2) {
         UNROLL for (int q = 0; q < KEPT; ++q) {
             const VECTOR c = turn[2 * (n2 * KEPT + q)], s = turn[2 * (n2 * KEPT + q) + 1];
             re[q] = fma(c, a[2 * n2], fma(-s, a[2 * n2 + 1], re[q]));
@@ -151,7 +151,7 @@ __kernel void along_x(__global const double *heights, const double scale, const 
     const int nx = axis.n;
     __global VECTOR *sample = scratch + get_global_id(0) * room, *a = sample + nx;
 
-    for (int y = get_global_id(0); y < ny; y += get_global_size(0)) {
+    ROLLED for (int y = get_global_id(0); y < ny; y += get_global_size(0)) {
         __global const double *row = heights + (long)((y + ny / 2) % ny) * nx;
         /* the samples from the middle on, then those before it; what spills over their ends is written again */
         ROLLED for (int part = 0; part < 2; ++part) {
@@ -164,7 +164,7 @@ __kernel void along_x(__global const double *heights, const double scale, const 
             }
         }
         first_step(sample, cosine, sine, axis, 1, STEP_X, a);
-        for (int b = 0; b < axis.blocks; ++b) {
+        ROLLED for (int b = 0; b < axis.blocks; ++b) {
             VECTOR f[KEPT][2];
             second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
             ROLLED for (int q = 0; q < KEPT; ++q) {
@@ -197,9 +197,9 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *cosine
     __global VECTOR *a = scratch + get_global_id(0) * room;
     const int lit = min(LANES, terms - first);
 
-    for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
+    ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
         first_step(narrow + 2L * phi * axis.n, cosine, sine, axis, 2, STEP_Y, a);
-        for (int b = 0; b < axis.blocks; ++b) {
+        ROLLED for (int b = 0; b < axis.blocks; ++b) {
             VECTOR f[KEPT][2];
             second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
             ROLLED for (int q = 0; q < KEPT; ++q) {

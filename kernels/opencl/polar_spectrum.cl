@@ -25,7 +25,7 @@
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
+#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
 #define INLINE __attribute__((always_inline))
 
 /* E is larger than caches: lines written past them need not be read first */
@@ -83,24 +83,24 @@ static INLINE void gather(__global const float *corner, const int columns, const
 
 /* rows and columns of sixteen vectors change places: halves, quarters, pairs and single lanes in turn */
 static void transpose(float16 *m) {
-    UNROLL for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < 8; ++i) {
         const float16 a = m[i], b = m[i + 8];
         m[i] = (float16)(a.lo, b.lo);
         m[i + 8] = (float16)(a.hi, b.hi);
     }
-    UNROLL for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < 8; ++i) {
         const int k = (i & 3) + 2 * (i & 4);
         const float16 a = m[k], b = m[k + 4];
         m[k] = (float16)(a.s0123, b.s0123, a.s89ab, b.s89ab);
         m[k + 4] = (float16)(a.s4567, b.s4567, a.scdef, b.scdef);
     }
-    UNROLL for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < 8; ++i) {
         const int k = (i & 1) + 2 * (i & 6);
         const float16 a = m[k], b = m[k + 2];
         m[k] = (float16)(a.s01, b.s01, a.s45, b.s45, a.s89, b.s89, a.scd, b.scd);
         m[k + 2] = (float16)(a.s23, b.s23, a.s67, b.s67, a.sab, b.sab, a.sef, b.sef);
     }
-    UNROLL for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < 8; ++i) {
         const int k = 2 * i;
         const float16 a = m[k], b = m[k + 1];
         m[k] = (float16)(a.s0, b.s0, a.s2, b.s2, a.s4, b.s4, a.s6, b.s6, a.s8, b.s8, a.sa, b.sa, a.sc, b.sc, a.se, b.se);

@@ -25,6 +25,7 @@
 #ifdef cl_khr_fp64
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #endif
+#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
 
 typedef struct {
     double dfx, dfy;            /* spacing of the DFT's frequencies, 1/um */
@@ -38,7 +39,7 @@ static void window_weights(const double4 d, const double df, const double invers
     const double4 ratio = exp(2.0 * df * inverse_2_variance * d), inverse = 1.0 / ratio;
     double4 up = exp(-inverse_2_variance * d * d), down = up;
     weight[reach] = up;
-    for (int j = 1; j <= reach; ++j) {
+    ROLLED for (int j = 1; j <= reach; ++j) {
         up *= ratio;
         down *= inverse;
         weight[reach + j] = up * decay[reach + j];
@@ -49,7 +50,7 @@ static void window_weights(const double4 d, const double df, const double invers
 /* Adds sum_i weight[4 i] cell[i * stride + k], i < count, to low, k < 8, and to high, 8 <= k < 16 */
 static void add(__global const double *cell, const long stride, const double *weight, const int count, double8 *low,
                 double8 *high) {
-    for (int i = 0; i < count; ++i, cell += stride) {
+    ROLLED for (int i = 0; i < count; ++i, cell += stride) {
         *low = fma((double8)weight[4 * i], vload8(0, cell), *low);
         *high = fma((double8)weight[4 * i], vload8(1, cell), *high);
     }
@@ -59,7 +60,7 @@ static void add(__global const double *cell, const long stride, const double *we
 static void weighted_sum(__global const double *cells, const long stride, const int start, const double4 *weights,
                          const int lane, const int count, const int width, __global double *sum) {
     const double *weight = (const double *)weights + lane;
-    for (int k = 0; k < width; k += 16) {
+    ROLLED for (int k = 0; k < width; k += 16) {
         double8 low = 0.0, high = 0.0;
         add(cells + start * stride + k, stride, weight, count - start, &low, &high);
         add(cells + k, stride, weight + 4 * (count - start), start, &low, &high);
@@ -78,8 +79,8 @@ static void bessel_factors(double8 z, const int terms, __global double *j, __glo
     const double4 later = fmax(start.lo, start.hi);
     const int top = (int)fmax(fmax(later.x, later.y), fmax(later.z, later.w));
     double8 above = 0.0, here = 0.0, norm = 0.0;
-    for (int n = top + 1; n < terms; ++n) vstore8((double8)0.0, n, j);
-    for (int n = top; n >= 0; --n) {
+    ROLLED for (int n = top + 1; n < terms; ++n) vstore8((double8)0.0, n, j);
+    ROLLED for (int n = top; n >= 0; --n) {
         /* here = J_n up to a factor */
         const double8 below = (double)(n + 1) * two_over_z * here - above;
         above = here;
@@ -89,7 +90,7 @@ static void bessel_factors(double8 z, const int terms, __global double *j, __glo
     }
     /* J_n(-z) = (-1)^n J_n(z) */
     const double8 even = 2.0 / norm, odd = -even;
-    for (int n = 0; n < terms; n += 4) {
+    ROLLED for (int n = 0; n < terms; n += 4) {
         const double8 a = (n == 0 ? 0.5 : 1.0) * even * vload8(n, j), b = odd * vload8(n + 1, j);
         const double8 c = even * vload8(n + 2, j), d = odd * vload8(n + 3, j);
         vstore4((double4)(a.s0, b.s0, c.s0, d.s0), 0, factors + n);
@@ -111,7 +112,7 @@ static double total(const double8 x) {
 /* |sum_n i^n factors_n F_n|^2, F_n conjugated where turn is -1: h is real, so P(-f; s) has the conjugate coefficients */
 static double power_of(__global const double *f_n, __global const double *factors, const int blocks, const double turn) {
     double8 re = 0.0, im = 0.0;
-    for (int b = 0; b < blocks; ++b) {
+    ROLLED for (int b = 0; b < blocks; ++b) {
         const double8 factor = vload8(b, factors);
         re = fma(factor, vload8(b, f_n), re);
         im = fma(factor, vload8(blocks + b, f_n), im);
@@ -125,7 +126,7 @@ static double power_of(__global const double *f_n, __global const double *factor
 
 /* w of the first direction after `d` that has another than it, or the same where none has */
 static double next_w(__global const double4 *directions, const int d, const int end) {
-    for (int e = d + 1; e < end; ++e)
+    ROLLED for (int e = d + 1; e < end; ++e)
         if (directions[e].z != directions[d].z) return directions[e].z;
     return directions[d].z;
 }
@@ -135,7 +136,7 @@ static double next_w(__global const double4 *directions, const int d, const int 
 static void gather(__global const double *stack, const int columns, const int width, const int row, const int column,
                    const int fresh, const int taps_x, const int taps_y, const double4 *along_x, const double4 *along_y,
                    const int lane, __global double *ring, __global double *f_n) {
-    for (int c = max(column, fresh); c < column + taps_x; ++c)
+    ROLLED for (int c = max(column, fresh); c < column + taps_x; ++c)
         weighted_sum(stack + ((long)row * columns + c) * width, (long)columns * width, 0, along_y, lane, taps_y, width,
                      ring + c % taps_x * width);
     weighted_sum(ring, width, column % taps_x, along_x, lane, taps_x, width, f_n);
@@ -160,7 +161,7 @@ static void line_power(__global const double *stack, __global const double *deca
     int known = 0;
     double w_known[2] = {1.0, 1.0}, u_before = -1.0;
 
-    for (int d = begin; d < end; ++d) {
+    ROLLED for (int d = begin; d < end; ++d) {
         const double u = directions[d].x, w = directions[d].z, turn = directions[d].w;
         if (w == w_known[1 - known]) known = 1 - known;
         if (w != w_known[known]) {
@@ -178,7 +179,7 @@ static void line_power(__global const double *stack, __global const double *deca
         if (!same_f)
             window_weights(fx - nearest_x * grid.dfx, grid.dfx, grid.inverse_2_variance, decay, reach_x, along_x);
         double found[4];
-        for (int lane = 0; lane < 4; ++lane) {
+        ROLLED for (int lane = 0; lane < 4; ++lane) {
             found[lane] = NAN;
             if (!((const int *)&inside)[lane]) continue;
             if (!same_f)
@@ -201,7 +202,7 @@ __kernel void power_spectrum(__global const double *stack, __global const double
     const long item = get_global_id(0), items = get_global_size(0), tasks = (long)lines * groups;
     __global double *const own = scratch + item * 16 * blocks * (4 * (2 * reach_x + 1) + 12);
     /* neighbouring wavelengths of a line ask for the same coefficients, one after the other */
-    for (long task = item * tasks / items; task < (item + 1) * tasks / items; ++task) {
+    ROLLED for (long task = item * tasks / items; task < (item + 1) * tasks / items; ++task) {
         const int line = task / groups, group = task % groups;
         line_power(stack, decay, grid, blocks, reach_x, reach_y, first[line], first[line + 1], directions, place,
                    vload4(group, lambda), half_range, fx_max, fy_max, own, power + 4 * group, 4 * groups);

@@ -23,7 +23,7 @@
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* loops whose speed does not matter: written out they cost compiling time */
+#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
 #define CHUNK 24  /* points whose G waits in the nearest cache */
 
 typedef struct {
@@ -61,8 +61,8 @@ static void share_points(const Group group, const Ring ring, const double stretc
                          __global int2 *span) {
     const int about = group.on_nodes ? 1 : ORDER;
     int first = group.points - about;
-    for (int o = 0; o < group.points * 3 * w_terms; ++o) shares[o] = 0.0f;
-    for (int l = 0; l < ring.count; ++l) {
+    ROLLED for (int o = 0; o < group.points * 3 * w_terms; ++o) shares[o] = 0.0f;
+    ROLLED for (int l = 0; l < ring.count; ++l) {
         float weight[ORDER] = {1.0f};
         if (group.on_nodes)
             first = group.points - 1 - l;
@@ -70,16 +70,16 @@ static void share_points(const Group group, const Ring ring, const double stretc
             const double at = stretch / lambda[ring.nodes + l];
             while (first > 0 && line[first + ORDER / 2 - 1] > at) --first;
             double x[ORDER];
-            for (int a = 0; a < ORDER; ++a) x[a] = line[first + a];
+            ROLLED for (int a = 0; a < ORDER; ++a) x[a] = line[first + a];
             lagrange(x, at, weight);
         }
         if (l == 0) span->y = first + about;
         const float4 xyz = weights[ring.nodes + l];
         const float channel[3] = {xyz.x, xyz.y, xyz.z};
         __global const float *reflected = reflectance + (long)(ring.reflected + l) * w_terms;
-        for (int a = 0; a < about; ++a)
-            for (int c = 0; c < 3; ++c)
-                for (int m = 0; m < w_terms; m += 4) {
+        ROLLED for (int a = 0; a < about; ++a)
+            ROLLED for (int c = 0; c < 3; ++c)
+                ROLLED for (int m = 0; m < w_terms; m += 4) {
                     __global float *share = shares + ((first + a) * 3 + c) * w_terms + m;
                     vstore4(fma((float4)(channel[c] * weight[a]), vload4(0, reflected + m), vload4(0, share)), 0, share);
                 }
@@ -115,29 +115,29 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
     const double from = rho[group.ring];
     const float w_max = sqrt(fmax(4.0 - from * from, 0.0));
 
-    for (int p = group.first; p < group.first + group.points; ++p) {
+    ROLLED for (int p = group.first; p < group.first + group.points; ++p) {
         if (!group.on_radii) {
             double x[ORDER];
-            for (int a = 0; a < ORDER; ++a) x[a] = node(radius, place[p] + a);
+            ROLLED for (int a = 0; a < ORDER; ++a) x[a] = node(radius, place[p] + a);
             float weight[ORDER];
             lagrange(x, from * kappa[p], weight);
-            for (int a = 0; a < ORDER; ++a) along_r[p * ORDER + a] = weight[a];
+            ROLLED for (int a = 0; a < ORDER; ++a) along_r[p * ORDER + a] = weight[a];
         }
         const float scale = 2.0f * 2.0f * (float)M_PI * w_max * (float)kappa[p] / s_max;
-        for (int m = 0; m < w_terms; m += 4) {
+        ROLLED for (int m = 0; m < w_terms; m += 4) {
             const float4 z = scale * vload4(0, w_node + m) - 1.0f;
             float4 T[MOST_S_NODES];
             T[0] = 1.0f;
             T[1] = z;
-            for (int k = 2; k < s_nodes; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
-            for (int j = 0; j < s_nodes; ++j) {
+            ROLLED for (int k = 2; k < s_nodes; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
+            ROLLED for (int j = 0; j < s_nodes; ++j) {
                 float4 sum = 0.0f;
-                for (int k = 0; k < s_nodes; ++k) sum = fma((float4)cardinal[k * s_nodes + j], T[k], sum);
+                ROLLED for (int k = 0; k < s_nodes; ++k) sum = fma((float4)cardinal[k * s_nodes + j], T[k], sum);
                 vstore4(sum, 0, along_s + ((long)p * s_nodes + j) * w_terms + m);
             }
         }
     }
-    for (int i = group.ring; i < group.ring + group.rings; ++i)
+    ROLLED for (int i = group.ring; i < group.ring + group.rings; ++i)
         share_points(group, rings[i], stretch[i], kappa + group.first, lambda, weights, reflectance,
                      w_terms, shares + (long)rings[i].shares * 3 * w_terms, span + i);
 }
@@ -149,7 +149,7 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
                      const int s_nodes, const int w_terms, float16 (*line)[2]) {                                       \
         float16 sum[W_BLOCK][2];                                                                                       \
         UNROLL for (int m = 0; m < W_BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                         \
-        for (int j = 0; j < s_nodes; ++j) {                                                                            \
+        ROLLED for (int j = 0; j < s_nodes; ++j) {                                                                     \
             const float16 a = vload16(j, here), b = vload16(j, opposite);                                              \
             UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                 \
                 const float16 c = along_s[j * w_terms + m];                                                            \
@@ -176,9 +176,9 @@ static void between_radii(__global const float *here, __global const float *oppo
         row_here[k] = row + (i < 0 ? opposite : here);
         row_opposite[k] = row + (i < 0 ? here : opposite);
     }
-    for (int j = 0; j < s_nodes; ++j) {
+    ROLLED for (int j = 0; j < s_nodes; ++j) {
         float16 a = 0.0f, b = 0.0f;
-        UNROLL for (int k = 0; k < ORDER; ++k) {
+        ROLLED for (int k = 0; k < ORDER; ++k) {
             const float16 weight = along_r[k];
             a = fma(weight, vload16(j, row_here[k]), a);
             b = fma(weight, vload16(j, row_opposite[k]), b);
@@ -199,7 +199,7 @@ static void add_shares(const float16 (*line)[2], const int points, const int m, 
     UNROLL for (int c = 0; c < 3; ++c)
         UNROLL for (int k = 0; k < SHARE_BLOCK; ++k)
             UNROLL for (int tile = 0; tile < 2; ++tile) part[c][k][tile] = sum[c * w_terms + m + k][tile];
-    for (int p = 0; p < points; ++p)
+    ROLLED for (int p = 0; p < points; ++p)
         UNROLL for (int k = 0; k < SHARE_BLOCK; ++k) {
             const float16 a = line[p * w_terms + m + k][0], b = line[p * w_terms + m + k][1];
             UNROLL for (int c = 0; c < 3; ++c) {
@@ -217,16 +217,16 @@ static void add_shares(const float16 (*line)[2], const int points, const int m, 
 static void take_line(const Group group, const int from, const int to, __global const float *here,
                       __global const float *opposite, __global const int *place, __global const float *along_r,
                       __global const float *along_s, const int s_nodes, const int w_terms, float16 (*line)[2]) {
-    for (int p = group.first + from; p < group.first + to; ++p, line += w_terms) {
+    ROLLED for (int p = group.first + from; p < group.first + to; ++p, line += w_terms) {
         __global const float *weights = along_s + (long)p * s_nodes * w_terms;
         if (group.on_radii) {
             const long row = (long)place[p] * s_nodes * 16;
-            for (int m = 0; m < w_terms; m += W_BLOCK)
+            ROLLED for (int m = 0; m < w_terms; m += W_BLOCK)
                 block_on_radius(here + row, opposite + row, weights + m, s_nodes, w_terms, line + m);
         } else {
             float e_here[16 * MOST_S_NODES], e_opposite[16 * MOST_S_NODES];
             between_radii(here, opposite, place[p], along_r + p * ORDER, s_nodes, e_here, e_opposite);
-            for (int m = 0; m < w_terms; m += W_BLOCK)
+            ROLLED for (int m = 0; m < w_terms; m += W_BLOCK)
                 block_between_radii(e_here, e_opposite, weights + m, s_nodes, w_terms, line + m);
         }
     }
@@ -235,10 +235,10 @@ static void take_line(const Group group, const int from, const int to, __global 
 /* A ring's Chebyshev terms over its own w, from values at its group's nodes */
 static void write_terms(const float16 (*sum)[2], __global const float *w_series, const int w_terms, const int tile,
                         const int tiles, __global float *ring) {
-    for (int c = 0; c < 3; ++c)
-        for (int k = 0; k < w_terms; ++k) {
+    ROLLED for (int c = 0; c < 3; ++c)
+        ROLLED for (int k = 0; k < w_terms; ++k) {
             float16 a = 0.0f, b = 0.0f;
-            for (int m = 0; m < w_terms; ++m) {
+            ROLLED for (int m = 0; m < w_terms; ++m) {
                 a = fma((float16)w_series[k * w_terms + m], sum[c * w_terms + m][0], a);
                 b = fma((float16)w_series[k * w_terms + m], sum[c * w_terms + m][1], b);
             }
@@ -266,20 +266,20 @@ __kernel void apply_operator(__global const float *spectrum, const int radii, __
     __global const float *opposite = here + (long)tiles * radii * s_nodes * 16;
 
     float16 sum[MOST_RINGS * 3 * MOST_W_TERMS][2], line[CHUNK * MOST_W_TERMS][2];
-    for (int q = 0; q < group.rings * 3 * w_terms; ++q) sum[q][0] = sum[q][1] = 0.0f;
-    for (int from = 0; from < group.points; from += CHUNK) {
+    ROLLED for (int q = 0; q < group.rings * 3 * w_terms; ++q) sum[q][0] = sum[q][1] = 0.0f;
+    ROLLED for (int from = 0; from < group.points; from += CHUNK) {
         const int to = min(from + CHUNK, group.points);
         take_line(group, from, to, here, opposite, place, along_r, along_s, s_nodes, w_terms, line);
-        for (int i = 0; i < group.rings; ++i) {
+        ROLLED for (int i = 0; i < group.rings; ++i) {
             const int2 taken = span[group.ring + i];
             const int first = max(from, taken.x), points = min(to, taken.y) - first;
             __global const float *own = shares + (long)(rings[group.ring + i].shares + first) * 3 * w_terms;
             if (points > 0)
-                for (int m = 0; m < w_terms; m += SHARE_BLOCK)
+                ROLLED for (int m = 0; m < w_terms; m += SHARE_BLOCK)
                     add_shares(line + (first - from) * w_terms, points, m, w_terms, own, sum + i * 3 * w_terms);
         }
     }
-    for (int i = 0; i < group.rings; ++i) {
+    ROLLED for (int i = 0; i < group.rings; ++i) {
         const long ring = group.ring + i;
         write_terms(sum + i * 3 * w_terms, w_series + ring * w_terms * w_terms, w_terms, tile, tiles,
                     table + ring * 96 * w_terms * tiles);
