@@ -168,7 +168,7 @@ def _probe(platform: Any, device: Any) -> Probe:
 class Device:
     """The device in use, its context and its in-order queue.
 
-    vector_width: floats of a vector register, 4, 8 or 16; blocks of every kernel follow it.
+    vector_width: floats of a vector register that its compiler builds for.
     shares_memory: whether its memory is the process's.
     """
 
@@ -192,8 +192,8 @@ def default_device() -> Device:
     for probe in probes:
         if not probe.fault:
             queue = _opencl().CommandQueue(probe.context)
-            width = min(16, max(4, probe.vector_width))
             shares = bool(queue.device.host_unified_memory)
+            width = probe.vector_width
             return Device(probe.device, probe.driver, probe.compute_units, width, shares, probe.context, queue)
     tried = "; ".join(f"{probe.device}: {probe.fault}" for probe in probes)
     raise NoDeviceError(_why_none(wanted, [device.name.strip() for _, device in listed], tried))

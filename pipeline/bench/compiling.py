@@ -54,7 +54,7 @@ def measure(command_line: CommandLine, progress: Progress = silent) -> Compiling
     Raises RunFailedError.
     """
     with tempfile.TemporaryDirectory() as folder:
-        cache, done = Path(folder) / "cache", iter(range(1, 8))
+        cache, done = Path(folder) / "cache", iter(range(1, 9))
 
         def config(name: str, text: str) -> Path:
             path = Path(folder) / f"{name}.toml"
@@ -63,17 +63,20 @@ def measure(command_line: CommandLine, progress: Progress = silent) -> Compiling
 
         def cpu_s(path: Path) -> float:
             spent = command_line.run(path, cache, until="table").cpu_s
-            progress("compiling", next(done) / 7.0)
+            progress("compiling", next(done) / 8.0)
             return spent
 
         def forget_kernels() -> None:
             shutil.rmtree(cache / "diffract-bake" / "kernels", ignore_errors=True)
 
         first, other = config("first", _FIRST), config("next", _NEXT)
-        # all other caches are filled before
+        def cold_s(path: Path) -> float:
+            forget_kernels()
+            return cpu_s(path)
+
+        # all other caches are filled before; what else the machine does only adds
         cpu_s(first)
-        forget_kernels()
-        cold = cpu_s(first)
+        cold = min(cold_s(first), cold_s(first))
         warm = min(cpu_s(first), cpu_s(first))
         cold_next = cpu_s(other)
         warm_next = min(cpu_s(other), cpu_s(other))

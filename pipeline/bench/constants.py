@@ -35,7 +35,7 @@ def measure(setting: Setting, repeats: int, progress: Progress = silent) -> list
     """Every constant beside another value; both are timed one after the other, for a machine's pace changes."""
     found = []
     for done, (name, kernels) in enumerate(_KERNELS.items(), 1):
-        value, other = blocks.of_device()[name], blocks.other_value(name)
+        value, other = blocks.chosen(name)[name], blocks.OTHERS[name]
         with blocks.instead(**{name: other}):
             other_s = _seconds(setting, repeats, kernels)
         found.append(Constant(name, value, _seconds(setting, repeats, kernels), other, other_s))
