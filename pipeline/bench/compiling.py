@@ -70,6 +70,7 @@ def measure(command_line: CommandLine, progress: Progress = silent) -> Compiling
             shutil.rmtree(cache / "diffract-bake" / "kernels", ignore_errors=True)
 
         first, other = config("first", _FIRST), config("next", _NEXT)
+
         def cold_s(path: Path) -> float:
             forget_kernels()
             return cpu_s(path)
