@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from cli import console, sources
-from pipeline.config import Config
+from pipeline.config.models import Config
 
 
 @click.command("run")
@@ -54,7 +54,7 @@ def bake_all(
 
 def _bake_until(loaded: list[Config], until: str, store_root: Path | None, as_json: bool) -> None:
     """Only the stages up to one: what they are is told, nothing is laid out."""
-    from pipeline import run
+    from pipeline.stages import run
 
     results: list[dict[str, Any]] = []
     for config in loaded:
@@ -118,7 +118,7 @@ def require_folder(folder: Path) -> None:
 
 
 def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> dict[str, Any]:
-    from pipeline import run
+    from pipeline.stages import run
 
     store = console.open_store(store_root)
     console.note(f"{config.name}:")
@@ -137,9 +137,9 @@ def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool)
 
 def _lay_out(store: Any, artifacts: dict[str, Any], folder: Path) -> list[Path]:
     """Copies what people look at out of the store."""
-    from pipeline import scratch
     from pipeline.stages.validate import REPORT
-    from pipeline.store import writing
+    from pipeline.store import scratch
+    from pipeline.store.store import writing
 
     maps, report = (store.open(name, artifacts[name].key) for name in ("render", "validate"))
     sources_of = [*(maps.folder / name for name in sorted(maps.record["files"])), report.folder / REPORT]
@@ -164,7 +164,7 @@ def publish_bundle(config: Config, store: Any, artifacts: dict[str, Any], folder
 
 
 def _tell(result: dict[str, Any]) -> None:
-    from pipeline.report.validation_report import ERROR_COLUMNS, error_rows
+    from pipeline.stages.validation_report import ERROR_COLUMNS, error_rows
 
     click.echo(f"{result['name']}: CIELAB error of the table against the exact sum")
     console.print_table(ERROR_COLUMNS, error_rows(result["stages"]["validate"]["summary"]))
@@ -195,8 +195,8 @@ def plan_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | N
 
 def _plan(config: Config, store: Any, folder: Path) -> list[dict[str, str]]:
     """Every stage and, last, the bundle."""
-    from pipeline import run
     from pipeline.bundle.publish import published
+    from pipeline.stages import run
 
     steps = run.plan(config, store)
     rows = [

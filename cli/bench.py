@@ -39,9 +39,9 @@ def bench_command(
     bandwidth, which are measured in the same run; the stack's transforms by the kernel, pyFFTW and scipy; what each
     constant of the kernels buys; and what compiling costs. Without CONFIGs: three synthetic surfaces.
     """
-    from pipeline.bench import criteria, files, machine
-    from pipeline.store import writing
-    from pipeline.stress import judging, sweep
+    from pipeline.evaluation.speed import criteria, files, machine
+    from pipeline.evaluation.stability import judging, sweep
+    from pipeline.store.store import writing
 
     store = console.open_store(store_root)
     with _paths(config_paths) as paths:
@@ -85,7 +85,7 @@ def _paths(given: tuple[Path, ...]) -> Iterator[tuple[Path, ...]]:
 
 def _surface(config: Any, path: Path, store: Any, quick: bool) -> tuple[Any, float | None]:
     """One surface's measurements, and the seconds of a whole run."""
-    from pipeline.bench import suite
+    from pipeline.evaluation.speed import suite
 
     with console.showing_progress() as progress:
         field = _field(config, store, progress)
@@ -96,8 +96,7 @@ def _surface(config: Any, path: Path, store: Any, quick: bool) -> tuple[Any, flo
 
 def _field(config: Any, store: Any, progress: Any) -> Any:
     """The height field of a config."""
-    from pipeline import run
-    from pipeline.stages import surface
+    from pipeline.stages import run, surface
 
     artifacts = run.execute(config, run.plan(config, store, "surface"), store, progress)
     return surface.load(store.open("surface", artifacts["surface"].key))
@@ -105,8 +104,8 @@ def _field(config: Any, store: Any, progress: Any) -> Any:
 
 def _constants(config: Any, store: Any) -> Any:
     """What each constant of the kernels buys on a surface."""
-    from pipeline.bench import constants, setting
-    from pipeline.bench.suite import FULL, MAIN
+    from pipeline.evaluation.speed import constants, setting
+    from pipeline.evaluation.speed.suite import FULL, MAIN
 
     console.note("constants of the kernels:")
     with console.showing_progress() as progress:
@@ -116,8 +115,8 @@ def _constants(config: Any, store: Any) -> Any:
 
 def _compiling() -> Any:
     """What a new machine waits for; None where a run failed."""
-    from pipeline.bench import compiling
-    from pipeline.bench.processes import RunFailedError
+    from pipeline.evaluation.speed import compiling
+    from pipeline.evaluation.speed.processes import RunFailedError
 
     console.note("a new machine:")
     try:
@@ -129,7 +128,7 @@ def _compiling() -> Any:
 
 
 def _command_line() -> Any:
-    from pipeline.bench.processes import CommandLine
+    from pipeline.evaluation.speed.processes import CommandLine
 
     return CommandLine((sys.executable, "-c", _PROCESS))
 
@@ -139,7 +138,7 @@ def _whole_run(path: Path, progress: Any) -> float | None:
 
     The first fills the kernel cache; the fastest of the others counts.
     """
-    from pipeline.bench.processes import RunFailedError
+    from pipeline.evaluation.speed.processes import RunFailedError
 
     seconds: list[float] = []
     try:
@@ -153,8 +152,8 @@ def _whole_run(path: Path, progress: Any) -> float | None:
 
 
 def _large_scan(quick: bool) -> Any:
-    from pipeline.bench import criteria, memory
-    from pipeline.bench.suite import MAIN
+    from pipeline.evaluation.speed import criteria, memory
+    from pipeline.evaluation.speed.suite import MAIN
 
     if quick:
         return criteria.of_large_scan(None)
@@ -164,10 +163,10 @@ def _large_scan(quick: bool) -> Any:
 
 def _write(results: Any, out: Path) -> list[Path]:
     """bench.json, bench.csv and bench.png in `out`, each taking its place whole."""
-    from pipeline import scratch
-    from pipeline.bench import files, truth
-    from pipeline.report import bench_plots
-    from pipeline.store import writing
+    from pipeline.evaluation.plots import bench_plots
+    from pipeline.evaluation.speed import files, truth
+    from pipeline.store import scratch
+    from pipeline.store.store import writing
 
     contents = {
         "bench.json": files.json_text(results).encode(),
@@ -211,7 +210,7 @@ def _asked(criterion: Any) -> str:
 
 
 def _tell_surface(surface: Any, machine: Any) -> None:
-    from pipeline.bench.machine import share
+    from pipeline.evaluation.speed.machine import share
 
     ny, nx = surface.samples
     click.echo(

@@ -47,7 +47,7 @@ def open_store(root: Path | None) -> Any:
     """The store at `root`, or the user's own."""
     import platformdirs
 
-    from pipeline.store import Store
+    from pipeline.store.store import Store
 
     return Store(root or Path(platformdirs.user_cache_dir("diffract-bake")) / "store")
 

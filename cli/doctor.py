@@ -13,8 +13,8 @@ def doctor_command(as_json: bool) -> None:
     Exit code 5 where no device works. DIFFRACT_BAKE_DEVICE picks a device by a part of its name.
     """
     from kernels import device
-    from pipeline import provenance
-    from pipeline.working_device import require_device
+    from pipeline.diffraction.device import require_device
+    from pipeline.stages import provenance
 
     probes = device.probe_devices()
     versions = provenance.versions()

@@ -42,7 +42,7 @@ def _bundle(folder: Path) -> dict[str, Any]:
 
 
 def _config(path: Path) -> dict[str, Any]:
-    from pipeline import config_file
+    from pipeline.config import read as config_file
 
     resolved: dict[str, Any] = config_file.load(path).model_dump(mode="json")
     return resolved

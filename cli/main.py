@@ -107,7 +107,7 @@ def main() -> None:
 def _output_refused(error: OSError) -> int:
     """Exit code where stdout takes no more: its reader went away (as `| head` does), or its disk is full."""
     from pipeline.errors import StorageError
-    from pipeline.store import FULL
+    from pipeline.store.store import FULL
 
     if error.errno not in (errno.EPIPE, *FULL):
         return _internal_fault(error)

@@ -19,7 +19,7 @@ def publish_command(config_path: Path, out: Path, store_root: Path | None, as_js
     content gives the same digest; a standing bundle is never overwritten.
     """
     from cli.bake import publish_bundle
-    from pipeline import run
+    from pipeline.stages import run
 
     config, store = sources.load(config_path), console.open_store(store_root)
     with console.showing_progress() as progress:

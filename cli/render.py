@@ -33,12 +33,13 @@ def render_command(
     A map shows every view of one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files go
     to OUT/NAME as EXR (linear XYZ, 1 RU) and PNG.
     """
-    from pipeline import images, scratch
-    from pipeline.config import Direction
-    from pipeline.evaluate import Map, relative_unit, render_map
+    from pipeline.config.models import Direction
     from pipeline.optics.colour_error import pixels
+    from pipeline.report import images
     from pipeline.stages import render
-    from pipeline.store import writing
+    from pipeline.store import scratch
+    from pipeline.store.store import writing
+    from pipeline.tables.evaluate import Map, relative_unit, render_map
 
     if theta is None and phi is not None:
         raise click.UsageError("--phi turns a light given by --theta; name both")

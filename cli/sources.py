@@ -10,7 +10,8 @@ from cli import console
 
 def load(path: Path) -> Any:
     """The config in a file, with every fault that can be seen before work starts. Raises ConfigError."""
-    from pipeline import config_file, preflight
+    from pipeline.config import read as config_file
+    from pipeline.stages import config_check as preflight
 
     config = config_file.load(path)
     preflight.check(config, str(path))
@@ -30,19 +31,19 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
 
 def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
     """XYZ of pairs of directions from a config, baking what is missing."""
-    from pipeline import run
+    from pipeline.stages import run
 
     store = console.open_store(store_root)
     until = "surface" if exact else "table"
     artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
     artifact = store.open(until, artifacts[until].key)
     if exact:
-        from pipeline.reference import reference_evaluator
+        from pipeline.diffraction.reference import reference_evaluator
         from pipeline.stages import surface
 
         return reference_evaluator(surface.load(artifact), config, progress)
-    from pipeline.evaluate import table_evaluator
     from pipeline.stages import table
+    from pipeline.tables.evaluate import table_evaluator
 
     return table_evaluator(table.load(config, artifact), config, progress)
 
@@ -54,11 +55,10 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
     config = load(source)
     if not exact and getattr(config.table, "form", None) != "spectral":
         raise click.UsageError('--wavelengths needs table.form = "spectral" in the config, or --exact')
-    from pipeline import run
+    from pipeline.diffraction.reference import reference_of
     from pipeline.optics.geometry import uvw
-    from pipeline.reference import reference_of
-    from pipeline.stages import spectrum, surface
-    from pipeline.tables import spectral
+    from pipeline.stages import run, spectrum, surface
+    from pipeline.tables.polar import spectral
 
     store = console.open_store(store_root)
     until = "surface" if exact else "spectrum"

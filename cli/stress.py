@@ -28,10 +28,10 @@ def stress_command(quick: bool, out: Path, as_json: bool) -> None:
     A cell is ok where its error is within what its method promises, or refused with a reason. Exit code 4 where
     any is neither.
     """
-    from pipeline import scratch
     from pipeline.errors import AccuracyError
-    from pipeline.report import stress_plots
-    from pipeline.stress import judging, sweep
+    from pipeline.evaluation.plots import stress_plots
+    from pipeline.evaluation.stability import judging, sweep
+    from pipeline.store import scratch
 
     with console.showing_progress() as progress:
         outcomes = judging.sweep(sweep.cells(quick), progress)

@@ -56,8 +56,8 @@ def validate_command(
 
 
 def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root: Path | None, as_json: bool) -> None:
-    from pipeline.figures import pages
-    from pipeline.figures.figure import Bench
+    from pipeline.evaluation.figures import pages
+    from pipeline.evaluation.figures.figure import Bench
 
     require_folder(folder)
     store = console.open_store(store_root)
@@ -98,7 +98,7 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
 
     Raises ConfigError for two of one name, which no page could tell apart, and for a laser line.
     """
-    from pipeline.config import Config, LaserLine
+    from pipeline.config.models import Config, LaserLine
     from pipeline.errors import ConfigError
 
     found: dict[str, Config] = {}
@@ -118,10 +118,9 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
 
 def _surface(role: str, config: Any, store: Any) -> Any:
     """A surface of the bench. Raises ScanError for a flat one."""
-    from pipeline import run
     from pipeline.errors import ScanError
-    from pipeline.figures.figure import Surface
-    from pipeline.stages import surface
+    from pipeline.evaluation.figures.figure import Surface
+    from pipeline.stages import run, surface
 
     console.note(f"{config.name}:")
     with console.showing_progress() as progress:
@@ -137,10 +136,10 @@ def _write(made: list[Any], folder: Path) -> list[Path]:
     """index.html, a page each and validation.json, each taking its place whole."""
     import json
 
-    from pipeline import scratch
-    from pipeline.figures import pages
-    from pipeline.report import figure_pages
-    from pipeline.store import writing
+    from pipeline.evaluation.figures import html as figure_pages
+    from pipeline.evaluation.figures import pages
+    from pipeline.store import scratch
+    from pipeline.store.store import writing
 
     contents = {
         "index.html": figure_pages.index(made),

@@ -28,7 +28,7 @@ _GRID = np.dtype(
 
 @dataclass(frozen=True)
 class DeviceStack:
-    """A DFT stack on the device, its terms padded to `blocks` whole vectors; other values as in pipeline.stack."""
+    """A DFT stack on the device, its terms padded to `blocks` whole vectors; else as diffraction.dft_stack has it."""
 
     buffer: Any
     decay: Any

@@ -7,7 +7,7 @@ import hashlib
 import re
 from pathlib import Path, PurePosixPath
 
-from pipeline import digest
+from pipeline.store import digest
 
 SUMS = "SHA256SUMS"
 _SHOWN = 12

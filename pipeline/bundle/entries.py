@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.bundle.manifest import Colour, Coverage, Domain, MadeBy, Provenance
-from pipeline.config import Config, LaserLine, TaylorLayout
-from pipeline.digest import of_file
+from pipeline.config.models import Config, LaserLine, TaylorLayout
 from pipeline.optics import validity
 from pipeline.optics.spectra import shortest_wavelength_nm
-from pipeline.store import Artifact
+from pipeline.store.digest import of_file
+from pipeline.store.store import Artifact
 from pipeline.surface.statistics import Period
-from pipeline.tables import grid
+from pipeline.tables.taylor import grid
 
 _NOT_RECORDED = "not recorded"
 _LUMINOUS_NM = 550.0

@@ -5,7 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from pipeline.images import write_exr
+from pipeline.report.images import write_exr
 
 CHANNELS = ("R", "G", "B", "A")
 

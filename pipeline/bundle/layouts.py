@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from pipeline.bundle import polar, taylor
 from pipeline.bundle.prepared import Prepared
-from pipeline.config import Config, PolarLayout
-from pipeline.store import Artifact
+from pipeline.config.models import Config, PolarLayout
+from pipeline.store.store import Artifact
 
 
 def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from pipeline.bundle.material import MaterialEntry
-from pipeline.config import Section
+from pipeline.config.models import Section
 
 MANIFEST = "manifest.json"
 SCHEMA_VERSION: Literal[3] = 3

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.config import Config, PolarLayout, Section
+from pipeline.config.models import Config, PolarLayout, Section
 from pipeline.optics import fresnel
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import trapezoid

@@ -5,7 +5,7 @@ from pathlib import Path
 from pipeline.bundle.evaluate import Bundle
 from pipeline.bundle.verify import summary, verify
 from pipeline.errors import DamagedError
-from pipeline.evaluate import Evaluator
+from pipeline.tables.evaluate import Evaluator
 
 
 def bundle_evaluator(folder: Path) -> Evaluator:

@@ -8,10 +8,10 @@ from pipeline.bundle import exr, polar_readme, polar_storage
 from pipeline.bundle.manifest import CertificateEntry, PolarGrid, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
-from pipeline.config import Config
+from pipeline.config.models import Config
 from pipeline.stages import polar_table, surface
-from pipeline.store import Artifact
-from pipeline.tables.compression import CHANNELS, Textures
+from pipeline.store.store import Artifact
+from pipeline.tables.polar.compression import CHANNELS, Textures
 
 _CONVENTION = (
     "value(u, v, |w|) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the factors of the "

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import half
 from pipeline.bundle.manifest import ColourErrors, PolarLoss
-from pipeline.config import Config
-from pipeline.directions import random_pairs
+from pipeline.config.models import Config
+from pipeline.diffraction.reference import reference_of
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import relative_unit, table_evaluator
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.reference import reference_of
+from pipeline.optics.random_directions import random_pairs
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.compression import Textures, compress, flattened, most_textures, whole
-from pipeline.tables.polar import PolarTable
-from pipeline.validation import RANDOM_DIRECTIONS
+from pipeline.tables.evaluate import relative_unit, table_evaluator
+from pipeline.tables.polar.compression import Textures, compress, flattened, most_textures, whole
+from pipeline.tables.polar.table import PolarTable
 
 _SEED = 20160816
 _MIRROR_EXPOSURE_RU = 1.0

@@ -7,21 +7,21 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from pipeline import scratch
 from pipeline.bundle import checksums, entries, exr, layouts, material, readme
 from pipeline.bundle.manifest import MANIFEST, SCHEMA_VERSION, Manifest, MapImage, TableImage
 from pipeline.bundle.prepared import Prepared
 from pipeline.bundle.verify import summary, verify
-from pipeline.config import Config
+from pipeline.config.models import Config
 from pipeline.errors import DamagedError
 from pipeline.progress import Progress, silent
 from pipeline.stages.validate import REPORT
-from pipeline.store import Artifact, writing
+from pipeline.store import scratch
+from pipeline.store.store import Artifact, writing
 
 EVALUATE, README = "evaluate.py", "README.md"
 TABLES, MAPS = "tables", "maps"
 _BESIDE = ".publishing-"
-# as pipeline.images.write_xyz names them
+# as pipeline.report.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
 
 

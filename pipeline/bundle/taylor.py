@@ -5,12 +5,12 @@ from collections.abc import Iterator, Mapping
 from pipeline.bundle import exr, taylor_half, taylor_readme
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
-from pipeline.config import Config
+from pipeline.config.models import Config
 from pipeline.optics.geometry import Array
 from pipeline.stages import taylor_table
-from pipeline.store import Artifact
-from pipeline.tables import grid
-from pipeline.tables.taylor import TaylorTable
+from pipeline.store.store import Artifact
+from pipeline.tables.taylor import grid
+from pipeline.tables.taylor.table import TaylorTable
 
 _CONVENTION = (
     "sum_p w^p I_p(u, v) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the "

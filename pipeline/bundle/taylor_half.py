@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, mirror_luminance, relative_error
 from pipeline.bundle import half
 from pipeline.bundle.manifest import RelativeErrors, TaylorLoss
-from pipeline.config import Config
-from pipeline.directions import random_pairs
+from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import relative_unit, table_evaluator
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.tables.taylor import TaylorTable
-from pipeline.validation import MIRROR_FLOOR, RANDOM_DIRECTIONS, mirror_luminance, relative_error
+from pipeline.optics.random_directions import random_pairs
+from pipeline.tables.evaluate import relative_unit, table_evaluator
+from pipeline.tables.taylor.table import TaylorTable
 
 _EXPOSURE_RU, _SEED = 7500.0, 20141101
 # largest 99th percentile of Y's relative error. Measured at 501 x 501: 0.07 and 0.2 % (random, mirror

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from pipeline import digest
 from pipeline.bundle import checksums, exr
 from pipeline.bundle.checksums import SUMS
 from pipeline.bundle.manifest import MANIFEST, Image, Manifest, PolarGrid
+from pipeline.store import digest
 
 
 def verify(folder: Path) -> list[str]:

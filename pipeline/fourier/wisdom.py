@@ -16,7 +16,7 @@ from pathlib import Path
 import platformdirs
 import pyfftw
 
-from pipeline import digest
+from pipeline.store import digest
 
 # in double, single and long double precision
 Wisdom = tuple[bytes, bytes, bytes]

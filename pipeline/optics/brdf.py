@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 
-from pipeline.config import FINE_STEP_NM, Config, Material, Spectrum
+from pipeline.config.models import FINE_STEP_NM, Config, Material, Spectrum
 from pipeline.optics import fresnel, geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import Quadrature, trapezoid

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import platformdirs
 
-from pipeline import digest
 from pipeline.optics.geometry import Array
+from pipeline.store import digest
 
 Tables = dict[str, Any]
 

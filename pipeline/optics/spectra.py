@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.config import LaserLine, Spectrum
+from pipeline.config.models import LaserLine, Spectrum
 from pipeline.errors import ScanError
 from pipeline.optics import colour_data
 from pipeline.optics.fresnel import read_columns

@@ -2,7 +2,7 @@
 
 The error is that of an order's efficiency, a share of what the flat surface reflects, in unpolarised light: the first
 order of sinusoids and of blazes with a vertical facet, of aluminium and of a dielectric of n = 1.5, under 0 and 30
-degrees. The validation bench measures it again and holds this table against it (pipeline/figures/validity.py).
+degrees. The validation bench measures it again and holds this table against it (evaluation/figures/validity.py).
 """
 
 from collections.abc import Sequence

@@ -7,18 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import arrays, certificate
-from pipeline.config import Config
-from pipeline.device_stack import kernel_digest
-from pipeline.evaluate import table_evaluator
+from pipeline.accuracy import certificate
+from pipeline.config.models import Config
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.reference import reference_of
+from pipeline.diffraction.upload import kernel_digest
 from pipeline.optics import brdf
 from pipeline.progress import Progress
-from pipeline.reference import reference_of
 from pipeline.stages import spectrum, surface
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
-from pipeline.store import Artifact
-from pipeline.tables import polar, quadrature
-from pipeline.tables.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.store import arrays
+from pipeline.store.store import Artifact
+from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
 
 _FILE = "table.zarr"
 

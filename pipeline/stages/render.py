@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import images
-from pipeline.config import Config, Direction
-from pipeline.evaluate import Map, relative_unit, render_map, table_evaluator
+from pipeline.config.models import Config, Direction
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import pixels
 from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
+from pipeline.report import images
 from pipeline.stages import table
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.tables.evaluate import Map, relative_unit, render_map, table_evaluator
 
 
 def _parameters(config: Config) -> dict[str, Any]:

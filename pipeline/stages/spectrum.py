@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import device
-from pipeline import arrays, spectrum, windows
-from pipeline.config import Config, LaserLine, PolarLayout
-from pipeline.device_stack import kernel_digest
+from pipeline.config.models import Config, LaserLine, PolarLayout
+from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction.polar_grid import Azimuths, Rings
+from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.stage import Inputs, Stage, Summary
-from pipeline.store import Artifact
-from pipeline.tables import plan
-from pipeline.tables.polar_grid import Azimuths, Rings
+from pipeline.store import arrays
+from pipeline.store.store import Artifact
+from pipeline.surface import windows
+from pipeline.tables.planning import plan
 
 _FILE = "spectrum.zarr"
 # from the stack to tables of a spectrum: the plan measures with them

@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import arrays, series
-from pipeline import stack as dft_stack
-from pipeline.config import Config, TaylorLayout
+from pipeline.config.models import Config, TaylorLayout
+from pipeline.diffraction import dft_stack
+from pipeline.diffraction import expansion as series
 from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.stage import Inputs, Stage, Summary, spectrum_parameters
-from pipeline.store import Artifact
+from pipeline.store import arrays
+from pipeline.store.store import Artifact
 
 _FILE = "stack.zarr"
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline import digest
-from pipeline.config import Config
+from pipeline.config.models import Config
 from pipeline.progress import Progress
-from pipeline.store import Artifact
+from pipeline.store import digest
+from pipeline.store.store import Artifact
 
 Inputs = Mapping[str, Artifact]
 Summary = dict[str, Any]

@@ -4,13 +4,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pipeline import arrays, digest
-from pipeline.config import Config
+from pipeline.config.models import Config
 from pipeline.errors import ScanError
 from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
 from pipeline.stages.stage import Inputs, Stage, Summary
-from pipeline.store import Artifact
+from pipeline.store import arrays, digest
+from pipeline.store.store import Artifact
 from pipeline.surface import recipes
 from pipeline.surface.conditioning import condition
 from pipeline.surface.heightfield import HeightField

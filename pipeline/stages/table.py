@@ -1,11 +1,11 @@
 """The table stage of either layout: one name, one place in the order."""
 
-from pipeline.config import Config, PolarLayout
+from pipeline.config.models import Config, PolarLayout
 from pipeline.stages import polar_table, taylor_table
 from pipeline.stages.stage import Stage
-from pipeline.store import Artifact
-from pipeline.tables.polar import PolarTable
-from pipeline.tables.taylor import TaylorTable
+from pipeline.store.store import Artifact
+from pipeline.tables.polar.table import PolarTable
+from pipeline.tables.taylor.table import TaylorTable
 
 
 def stage_of(config: Config) -> Stage:

@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import arrays
-from pipeline.config import Config
-from pipeline.device_stack import kernel_digest
+from pipeline.config.models import Config
+from pipeline.diffraction.upload import kernel_digest
 from pipeline.optics import brdf
 from pipeline.progress import Progress
 from pipeline.stages import stack
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
-from pipeline.store import Artifact
-from pipeline.tables import grid, taylor
+from pipeline.store import arrays
+from pipeline.store.store import Artifact
+from pipeline.tables.taylor import grid
+from pipeline.tables.taylor import table as taylor
 
 _FILE = "table.zarr"
 

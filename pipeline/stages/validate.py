@@ -6,14 +6,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipeline import convergence, validation
-from pipeline.config import Config, TaylorLayout
-from pipeline.device_stack import kernel_digest
-from pipeline.evaluate import Evaluator, table_evaluator
+from pipeline.accuracy import checks as validation
+from pipeline.accuracy import convergence
+from pipeline.config.models import Config, TaylorLayout
+from pipeline.diffraction.reference import MeanReference, reference_of
+from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
-from pipeline.reference import MeanReference, reference_of
 from pipeline.stages import render, spectrum, stack, surface, table
 from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.tables.evaluate import Evaluator, table_evaluator
 
 REPORT = "report.html"
 
@@ -36,7 +37,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         pictures = {name: picture.result() for name, picture in drawn.items()}
     for name, png in pictures.items():
         (folder / f"{name}.png").write_bytes(png)
-    from pipeline.report import validation_report
+    from pipeline.stages import validation_report
 
     (folder / REPORT).write_text(validation_report.build(config, inputs, results, pictures), encoding="utf-8")
     return results
@@ -73,7 +74,7 @@ def _measured(
 
 def _picture(of: str, *arguments: Any) -> bytes:
     """A plot by its function's name; matplotlib takes as long to import as a plot to draw, and only here."""
-    png: bytes = getattr(import_module("pipeline.report.plots"), of)(*arguments)
+    png: bytes = getattr(import_module("pipeline.accuracy.plots"), of)(*arguments)
     return png
 
 

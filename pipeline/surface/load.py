@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config import Surface, as_pair
+from pipeline.config.models import Surface, as_pair
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.readers import read_scan
 from pipeline.surface.readers.common import check_shape, fault, micrometres

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from pipeline import run
-from pipeline.config import Config
-from pipeline.config_file import parse
+from pipeline.config.models import Config
+from pipeline.config.read import parse
 from pipeline.progress import silent
-from pipeline.store import Artifact, Store
+from pipeline.stages import run
+from pipeline.store.store import Artifact, Store
 
 LAYOUTS = ("taylor", "polar")
 # the polar table is coarse on purpose: its budget lets the bake be quick

@@ -9,23 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.accuracy.checks import mirror_luminance
 from pipeline.bundle import evaluate, material
 from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.polar import grid_entry
 from pipeline.bundle.publish import publish
-from pipeline.config import Config
-from pipeline.directions import random_pairs
-from pipeline.evaluate import table_evaluator
+from pipeline.config.models import Config
+from pipeline.diffraction.polar_grid import Azimuths, Rings
+from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
+from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.spectra import trapezoid
 from pipeline.stages import table as table_stage
-from pipeline.tables import polar
-from pipeline.tables.compression import whole
-from pipeline.tables.polar import PolarTable
-from pipeline.tables.polar_grid import Azimuths, Rings
-from pipeline.tables.polar_grid import PolarGrid as TableGrid
-from pipeline.validation import mirror_luminance
+from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.compression import whole
+from pipeline.tables.polar.table import PolarTable
 
 from .conftest import LAYOUTS, SCENE, Baker, small
 

@@ -7,17 +7,17 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import polar_storage
 from pipeline.bundle.manifest import CertificateEntry, ColourErrors, Manifest, PolarGrid, PolarLoss
 from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.publish import publish, published
 from pipeline.bundle.verify import verify
-from pipeline.directions import random_pairs
 from pipeline.errors import AccuracyError, ConfigError
-from pipeline.evaluate import table_evaluator
 from pipeline.optics.colour_error import delta_e
+from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import polar_table
-from pipeline.validation import RANDOM_DIRECTIONS
+from pipeline.tables.evaluate import table_evaluator
 
 from .conftest import SCENE, Baker, small
 from .test_publish import manifest_of

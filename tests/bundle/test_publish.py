@@ -20,7 +20,7 @@ from pipeline.errors import DamagedError, StorageError
 from pipeline.optics import validity
 from pipeline.stages import taylor_table
 from pipeline.surface.statistics import Period
-from pipeline.tables import grid
+from pipeline.tables.taylor import grid
 
 from .conftest import SCENE, Baker, small
 

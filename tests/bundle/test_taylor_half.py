@@ -12,12 +12,12 @@ from pipeline.bundle.manifest import TaylorLoss
 from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
-from pipeline.directions import random_pairs
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import table_evaluator
 from pipeline.optics.colour_error import delta_e
+from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import taylor_table
-from pipeline.tables.taylor import TaylorTable
+from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.taylor.table import TaylorTable
 
 from .conftest import Baker, small
 from .test_publish import manifest_of

@@ -109,7 +109,7 @@ def test_nothing_outside_is_read(bundle: Path, monkeypatch: pytest.MonkeyPatch) 
     absolute = "".join(f"{digest}  {name}\n" for name in ("../secret", str(secret), "tables/../../secret", "link"))
     sums.write_text(sums.read_text(encoding="utf-8") + absolute + "no line\n", encoding="utf-8")
     hashed: list[Path] = []
-    from pipeline import digest as digests
+    from pipeline.store import digest as digests
 
     original = digests.of_file
 

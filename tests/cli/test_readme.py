@@ -74,7 +74,7 @@ def test_exit_codes_are_those_of_the_code() -> None:
 
 
 def test_every_config_and_every_key_is_told() -> None:
-    from pipeline.config import Config
+    from pipeline.config.models import Config
 
     for path in (REPOSITORY / "configs").glob("*.toml"):
         assert f"`{path.stem}`" in README or f"configs/{path.name}" in README

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipeline import images
+from pipeline.report import images
 from tests.cli.tool import Tool, recipe
 
 SIZE = 65

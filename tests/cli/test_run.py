@@ -6,7 +6,7 @@ import time
 import numpy as np
 from PIL import Image
 
-from pipeline import images
+from pipeline.report import images
 from tests.cli.tool import Result, Tool, files, leavings, too_wide
 
 STAGES = ["surface", "stack", "table", "render", "validate"]

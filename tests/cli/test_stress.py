@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import AccuracyError
-from pipeline.stress import judging, sweep
-from pipeline.stress.cell import Cell
+from pipeline.evaluation.stability import judging, sweep
+from pipeline.evaluation.stability.cell import Cell
 from tests.cli.tool import Tool, too_wide
 
 _NOISE = Cell("height", "series", "chebyshev", "float32", "noise", 10.0, (40, 48), (0.1, 0.12), 1.2)

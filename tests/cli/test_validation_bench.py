@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.accuracy.plots import png
 from pipeline.errors import AccuracyError
-from pipeline.figures import pages
-from pipeline.figures.figure import Bench, Check, Figure, Picture, Table
-from pipeline.report.plots import png
+from pipeline.evaluation.figures import pages
+from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
 from tests.cli.tool import REPOSITORY, Tool, recipe, too_wide
 
 
@@ -147,7 +147,10 @@ def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypat
     class Refusing:
         make = staticmethod(refuse)
 
-    modules = {"pipeline.figures.first": pages.import_module("first"), "pipeline.figures.tall_one": Refusing}
+    modules = {
+        "pipeline.evaluation.figures.first": pages.import_module("first"),
+        "pipeline.evaluation.figures.tall_one": Refusing,
+    }
     monkeypatch.setattr(pages, "PAGES", ("tall_one", "first"))
     monkeypatch.setattr(pages, "import_module", modules.__getitem__)
     result = tool("validate", "--bench")

@@ -7,7 +7,7 @@ import pyfftw
 import pytest
 import scipy.fft
 
-from pipeline.config import Elaphe, GaussianRandom
+from pipeline.config.models import Elaphe, GaussianRandom
 from pipeline.fourier import backend
 from pipeline.surface import recipes, statistics
 from pipeline.surface.recipes import random, snakes

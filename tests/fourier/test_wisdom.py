@@ -13,8 +13,8 @@ import pyfftw
 import pytest
 
 from kernels.dft_stack import Kept
-from pipeline import digest
 from pipeline.fourier import term_transforms, wisdom
+from pipeline.store import digest
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = Kept(psi_max=5, phi_max=6, reach=2)

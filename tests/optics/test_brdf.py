@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config import LaserLine, Material, Spectrum
+from pipeline.config.models import LaserLine, Material, Spectrum
 from pipeline.optics import brdf, fresnel, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.spectra import trapezoid

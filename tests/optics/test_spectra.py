@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.config import LaserLine, Spectrum
+from pipeline.config.models import LaserLine, Spectrum
 from pipeline.errors import ScanError
 from pipeline.optics.spectra import illuminant_at, observer_at, shortest_wavelength_nm, trapezoid
 

@@ -6,16 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import certificate, spectrum, windows
-from pipeline.config import Config
-from pipeline.config_file import parse
+from pipeline.accuracy import certificate
+from pipeline.config.models import Config
+from pipeline.config.read import parse
+from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction.reference import MeanReference, reference_of
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import table_evaluator
 from pipeline.optics import brdf, geometry
-from pipeline.reference import MeanReference, reference_of
-from pipeline.surface import recipes
+from pipeline.surface import recipes, windows
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import plan, polar, quadrature, scattering
+from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.planning import anisotropy as scattering
+from pipeline.tables.planning import plan
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
 
 pytestmark = pytest.mark.slow
 

@@ -7,18 +7,19 @@ import pytest
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
-from pipeline import spectrum
-from pipeline.config import Material, Spectrum
-from pipeline.evaluate import Map
+from pipeline.config.models import Material, Spectrum
+from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.reference import Reference
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.spectra import trapezoid
-from pipeline.reference import Reference
-from pipeline.tables import polar, quadrature
-from pipeline.tables.compression import Envelope, Textures, compress, flattened, most_textures, samples, whole
-from pipeline.tables.polar import PolarTable
-from pipeline.tables.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.tables.evaluate import Map
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.compression import Envelope, Textures, compress, flattened, most_textures, samples, whole
+from pipeline.tables.polar.table import PolarTable
 from tests.support import snake
 
 GRID = PolarGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from pipeline.config import Blazed, Rectangular, Sinusoid
-from pipeline.reference import Reference, power_direct
+from pipeline.config.models import Blazed, Rectangular, Sinusoid
+from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.ndimage import spline_filter1d
 
 from kernels import cubic_spline
-from pipeline.tables.polar import PolarTable, look_up
-from pipeline.tables.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.tables.polar.table import PolarTable, look_up
 
 GRIDS = [Azimuths(64), Azimuths(96, 0.4, 0.3), Azimuths(32, 0.7, -1.5)]
 

@@ -5,15 +5,17 @@ from functools import partial
 import numpy as np
 import pytest
 
-from pipeline import series, spectrum
-from pipeline.config import LaserLine, Material, Spectrum
+from pipeline.config.models import LaserLine, Material, Spectrum
+from pipeline.diffraction import expansion as series
+from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction.polar_grid import Azimuths, Rings
+from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf
 from pipeline.optics.spectra import Quadrature, trapezoid
-from pipeline.reference import Reference, power_direct
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import line_points, polar, quadrature, spectral, spectral_integral
-from pipeline.tables.polar_grid import Azimuths, Rings
+from pipeline.tables.polar import line_points, quadrature, spectral, spectral_integral
+from pipeline.tables.polar import table as polar
 
 SIGMA = 2.0
 LIGHT = Spectrum()

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.config import LaserLine, Material, Spectrum
+from pipeline.config.models import LaserLine, Material, Spectrum
+from pipeline.diffraction.reference import Reference, power_direct, xyz_direct
 from pipeline.errors import AccuracyError
-from pipeline.evaluate import Map
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.spectra import trapezoid
-from pipeline.reference import Reference, power_direct, xyz_direct
 from pipeline.surface.heightfield import HeightField
+from pipeline.tables.evaluate import Map
 
 LAMBDA_NM = 550.0
 

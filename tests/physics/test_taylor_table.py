@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from pipeline import series, stack
-from pipeline.bench import plain_numpy
-from pipeline.config import Blazed, Direction, Scene, Sinusoid, Spectrum, Views
+from pipeline.config.models import Blazed, Direction, Scene, Sinusoid, Spectrum, Views
+from pipeline.diffraction import dft_stack as stack
+from pipeline.diffraction import expansion as series
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
+from pipeline.evaluation.speed import plain_numpy
 from pipeline.optics.spectra import Quadrature, trapezoid
-from pipeline.reference import Reference
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables import grid, taylor
+from pipeline.tables.taylor import grid
+from pipeline.tables.taylor import table as taylor
 from tests.support import snake
 
 TOLERANCE = 1e-4

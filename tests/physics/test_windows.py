@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from pipeline import spectrum, windows
-from pipeline.config import Coherence, LaserLine, Material, PolarLayout, Spectrum
-from pipeline.reference import MeanReference, power_direct, xyz_direct
+from pipeline.config.models import Coherence, LaserLine, Material, PolarLayout, Spectrum
+from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction.reference import MeanReference, power_direct, xyz_direct
+from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import measure
-from pipeline.tables import plan
+from pipeline.tables.planning import plan
 
 SIGMA = 1.5
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from pipeline.config import Surface
+from pipeline.config.models import Surface
 from pipeline.errors import ScanError
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.load import ScanRecord, load_scan

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from pipeline.config import Recipe
+from pipeline.config.models import Recipe
 from pipeline.errors import ConfigError
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from pipeline.config import Blazed, CompactDisc, Elaphe, GaussianRandom, Sinusoid, TiltedMirror, Xenopeltis
+from pipeline.config.models import Blazed, CompactDisc, Elaphe, GaussianRandom, Sinusoid, TiltedMirror, Xenopeltis
 from pipeline.surface.conditioning import condition
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make

@@ -6,7 +6,7 @@ construction a file: `gratings.py`, `disc.py`, `random.py`, `snakes.py`.
 
 from typing import assert_never
 
-from pipeline import config
+from pipeline.config import models as config
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import disc, gratings, random, snakes
 

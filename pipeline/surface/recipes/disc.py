@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config import CompactDisc
+from pipeline.config.models import CompactDisc
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.patch import LONGEST_RUN, SHORTEST_RUN, Axis, generator, patch_of
 

@@ -7,7 +7,7 @@ from typing import assert_never
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config import (
+from pipeline.config.models import (
     Blazed,
     CompactDisc,
     Elaphe,

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from pipeline.config import GaussianRandom, as_pair
+from pipeline.config.models import GaussianRandom, as_pair
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.patch import Axis, generator, patch_of

@@ -1,0 +1,1 @@
+"""What every bake measures: certificate, checks and convergence."""

@@ -1,0 +1,95 @@
+"""The certificate of a table: its errors on directions that its planning never saw.
+
+The reference shares none of the table's approximations: a float64 stack with spare terms, gathered directly at every
+direction and every nanometre. It is checked itself, in every bake, against sums over samples on a few directions.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.accuracy.checks import (
+    MIRROR_FLOOR,
+    RandomCheck,
+    RelativeError,
+    check_random,
+    check_reference,
+    relative_error,
+)
+from pipeline.config.models import Config, PolarLayout
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.reference import MeanReference
+from pipeline.errors import AccuracyError
+from pipeline.optics import geometry
+from pipeline.optics.colour_error import ColourError
+from pipeline.optics.random_directions import random_pairs
+from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
+from pipeline.progress import Progress, silent
+from pipeline.tables.evaluate import Evaluator
+from pipeline.tables.planning import plan
+from pipeline.tables.polar import spectral
+
+_SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What a table was promised to keep, and what it keeps.
+
+    random: against the reference on random directions. reference: the reference against sums over samples.
+    measured: the mean CIELAB error on them at `exposure_ru`, to be held against `delta_e`.
+    """
+
+    delta_e: float
+    exposure_ru: float
+    measured: float
+    random: RandomCheck
+    reference: RelativeError
+
+
+def certify(
+    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+) -> Certificate:
+    """The certificate of a table (`evaluate`), beside the reference of its height field.
+
+    Raises AccuracyError where it misses its budget, or where the reference's two routes part.
+    """
+    checked = check_reference(reference.fields[0], reference.first, config)
+    random = check_random(evaluate, reference, config, progress)
+    exposure = config.accuracy.exposure_ru
+    measured = _at(random.colour, exposure)
+    budget = config.budget_delta_e
+    if measured > budget:
+        raise AccuracyError(
+            f"the table misses its budget: on {random.directions} random directions its mean CIELAB error at "
+            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. "
+            f"{_way_out(reference, config)}"
+        )
+    return Certificate(budget, exposure, measured, random, checked)
+
+
+def _way_out(reference: MeanReference, config: Config) -> str:
+    """What to do about a missed budget: grids follow anything but the sharp edge of what a coarse scan knows."""
+    text = 'Raise it, or leave table.rings, azimuths, terms and w_terms on "auto".'
+    band = min(reference.fields[0].band_limit_per_um)
+    if band >= plan.rho_max(config.scene) / (1e-3 * shortest_wavelength_nm(config.spectrum)):
+        return text
+    return (
+        f"{text} Where light is bright at {band:.3g} per um, where the pitch ends what is known, no table follows "
+        "the sudden dark: spectrum.range_nm or scene.views can leave out what lies beyond."
+    )
+
+
+def certify_spectral(power: PolarSpectrum, reference: MeanReference, config: Config) -> RelativeError | None:
+    """Errors of I_lambda on random directions, where a config asks for the spectral form: else nothing to say."""
+    if not isinstance(config.table, PolarLayout) or config.table.form != "spectral":
+        return None
+    wi, wr = random_pairs(config.scene, _SPECTRAL_DIRECTIONS, _SEED)
+    uvw = geometry.uvw(wi, wr)
+    wavelengths = trapezoid(config.spectrum, _SPECTRAL_STEP_NM).lambda_nm
+    exact = np.nan_to_num(reference.power(uvw, wavelengths))
+    return relative_error(spectral.look_up(spectral.build(power), uvw, wavelengths), exact, MIRROR_FLOOR)
+
+
+def _at(errors: list[ColourError], exposure_ru: float) -> float:
+    return next(error.mean for error in errors if error.exposure_ru == exposure_ru)

@@ -1,0 +1,138 @@
+"""How far a table is from the reference: on random directions, on maps, and as its settings vary."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.config.models import Config
+from pipeline.diffraction.reference import MeanReference, Reference, power_direct
+from pipeline.errors import AccuracyError
+from pipeline.optics import brdf, geometry
+from pipeline.optics.colour_error import ColourError, colour_errors, delta_e
+from pipeline.optics.geometry import Array
+from pipeline.optics.random_directions import random_pairs
+from pipeline.optics.spectra import trapezoid
+from pipeline.progress import Progress, silent
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.evaluate import Evaluator, Map, relative_unit
+
+# the map over which this project states colour errors: 301 x 301 inside radius 0.98
+MAP_SIZE, MAP_RADIUS = 301, 0.98
+RANDOM_DIRECTIONS = 2000
+_SEED = 20140601
+# |P|^2 below this share of the mirror is compared with it, not with itself
+MIRROR_FLOOR = 1e-7
+# what the reference promises, of the mirror
+_REFERENCE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class RelativeError:
+    """Statistics of |value - reference| / max(|reference|, floor)."""
+
+    median: float
+    percentile_99: float
+    maximum: float
+
+
+def relative_error(values: Array, reference: Array, floor: float) -> RelativeError:
+    """Relative error where the reference exceeds `floor`, absolute over `floor` below it."""
+    error = np.abs(values - reference) / np.maximum(np.abs(reference), floor)
+    return RelativeError(float(np.median(error)), float(np.percentile(error, 99)), float(error.max()))
+
+
+def mirror_luminance(config: Config, wi: Array, wr: Array) -> Array:
+    """Y (directions,) that |P|^2 = 1 at every wavelength would give at these directions."""
+    plain = trapezoid(config.spectrum, config.mean_step_nm)
+    inside = brdf.integrand_of(config)(config.mean_step_nm).weights[:, 1].sum()
+    return brdf.direction_factor(config.material, plain, wi, wr) * float(inside)
+
+
+def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourError]:
+    unit = relative_unit(config)
+    return colour_errors(found / unit, truth / unit, config.accuracy.exposure_ru)
+
+
+@dataclass(frozen=True)
+class RandomCheck:
+    """A table against the reference on random directions: Y of |P|^2 integrated, and colours."""
+
+    directions: int
+    power: RelativeError
+    colour: list[ColourError]
+
+
+def check_random(
+    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+) -> RandomCheck:
+    """The table (`evaluate`) against the reference on directions it was not made for."""
+    wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
+    truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
+    found = evaluate(wi, wr)
+    # over a mirror's Y what is left is |P|^2
+    mirror = mirror_luminance(config, wi, wr)
+    power = relative_error(found[:, 1] / mirror, truth[:, 1] / mirror, MIRROR_FLOOR)
+    return RandomCheck(len(wi), power, _colour_errors(config, found, truth))
+
+
+@dataclass(frozen=True)
+class MapCheck:
+    """A table against the reference on one light's map; images are XYZ (size, size, 3) in RU."""
+
+    views: Map
+    table: Array
+    reference: Array
+    colour: list[ColourError]
+
+    def delta_e_image(self, exposure_ru: float) -> Array:
+        """CIELAB error (size, size) at an exposure."""
+        return delta_e(self.table, self.reference, exposure_ru)
+
+
+def check_map(
+    evaluate: Evaluator,
+    reference: MeanReference,
+    config: Config,
+    light: Array,
+    radius: float,
+    progress: Progress = silent,
+) -> MapCheck:
+    """The table against the reference on the map of one light (3,)."""
+    views = Map(MAP_SIZE, min(MAP_RADIUS, radius))
+    wr = views.views()
+    wi = np.broadcast_to(light, wr.shape)
+    truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
+    found = evaluate(wi, wr)
+    unit, errors = relative_unit(config), _colour_errors(config, found, truth)
+    return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors)
+
+
+def check_reference(field: HeightField, reference: Reference, config: Config, directions: int = 3) -> RelativeError:
+    """The reference's fast route against the plain sum over samples, on a few directions, each at one wavelength.
+
+    Raises AccuracyError where they differ: then nothing measured against the reference means anything.
+    """
+    wi, wr = random_pairs(config.scene, directions, _SEED + 1)
+    # the mirror direction is within every scan's band
+    uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -1.5]]])
+    nodes = trapezoid(config.spectrum, 100.0).lambda_nm
+    direction = np.arange(len(uvw))
+    node = direction % len(nodes)
+    direct = _direct_sums(field, config.coherence.sigma_um, uvw, nodes[node])
+    known = np.isfinite(direct)
+    fast = reference.power(uvw, nodes)[direction, node]
+    if np.max(np.abs(fast - direct)[known]) > _REFERENCE_TOLERANCE:
+        raise AccuracyError(
+            f"the exact reference's two routes differ by {np.max(np.abs(fast - direct)[known]):.1e} of the mirror, "
+            f"more than {_REFERENCE_TOLERANCE:g}; please report this config"
+        )
+    return relative_error(fast[known], direct[known], MIRROR_FLOOR)
+
+
+def _direct_sums(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: Array) -> Array:
+    """|P|^2 (directions,) by plain sums, each direction at its own wavelength, a thread a sum."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        found = pool.map(lambda one, nm: power_direct(field, sigma_um, one[None], float(nm))[0], uvw, lambda_nm)
+        return np.array(list(found))

@@ -1,0 +1,177 @@
+"""How the error of a map depends on each setting of its table, on a coarse map under one light."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pipeline.accuracy.checks import MAP_RADIUS
+from pipeline.config.models import Config, TaylorLayout
+from pipeline.diffraction import dft_stack
+from pipeline.diffraction.polar_grid import TILE
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.reference import STEP_NM, MeanReference
+from pipeline.optics import brdf, geometry
+from pipeline.optics.colour_error import delta_e
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import trapezoid
+from pipeline.tables.evaluate import Evaluator, Map, relative_unit, table_evaluator
+from pipeline.tables.planning import plan
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.quadrature import RingQuadratures
+from pipeline.tables.taylor import table as taylor
+
+_MAP_SIZE = 61
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Mean CIELAB error at one exposure as one setting varies, everything else as configured."""
+
+    setting: str
+    unit: str
+    values: list[float]
+    errors: list[float]
+    chosen: float
+
+
+Study = Sequence[Callable[[], Curve]]
+
+
+class CoarseMap:
+    """A coarse map under one light, with the truth there."""
+
+    def __init__(self, reference: MeanReference, config: Config, light: Array, radius: float) -> None:
+        self.config, self._unit = config, relative_unit(config)
+        self.wr = Map(_MAP_SIZE, min(MAP_RADIUS, radius)).views()
+        self.wi = np.broadcast_to(light, self.wr.shape)
+        self._truth = reference.xyz(config.spectrum, config.material, self.wi, self.wr)
+
+    def error(self, evaluate: Evaluator) -> float:
+        """Mean CIELAB error of an evaluator."""
+        xyz, exposure = evaluate(self.wi, self.wr), self.config.accuracy.exposure_ru
+        return float(np.mean(delta_e(xyz / self._unit, self._truth / self._unit, exposure)))
+
+
+class TaylorStudy:
+    """Terms, wavelength step, resolution and exponent of the paper's table.
+
+    Terms and wavelength step are varied at the views themselves, without a grid between, the other of the two as
+    fine as the reference's; the grid is varied with everything else as configured.
+    """
+
+    def __init__(self, stack: dft_stack.Stack, layout: TaylorLayout, chosen: Evaluator, views: CoarseMap) -> None:
+        self._stack, self._layout, self._chosen, self._views = stack, layout, chosen, views
+        self._config = views.config
+
+    def curves(self, has_steps: bool) -> Study:
+        """Every setting; a laser line has no wavelength step to vary."""
+        return [self.terms, *([self.step] if has_steps else []), self.grid, self.exponent]
+
+    def terms(self) -> Curve:
+        """Mean error against the order N of the series."""
+        most = self._stack.terms - 1
+        orders = sorted({max(1, round(most * share)) for share in (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)})
+        errors = [self._at_views(order, STEP_NM) for order in orders]
+        return Curve("terms N", "", [float(order) for order in orders], errors, float(most))
+
+    def step(self) -> Curve:
+        """Mean error against the wavelength step."""
+        steps = sorted({1.0, 2.0, 5.0, 10.0, 20.0, self._layout.step_nm})
+        errors = [self._at_views(self._stack.terms - 1, step) for step in steps]
+        return Curve("wavelength step", "nm", steps, errors, self._layout.step_nm)
+
+    def grid(self) -> Curve:
+        """Mean error against the table's resolution, at the configured exponent."""
+        chosen = self._layout.resolution
+        sizes = sorted({n for n in (51, 101, 201, 301) if n < chosen})
+        errors = [self._on_grid(size, self._layout.power) for size in sizes]
+        errors.append(self._views.error(self._chosen))
+        return Curve("resolution", "nodes", [float(n) for n in (*sizes, chosen)], errors, float(chosen))
+
+    def exponent(self) -> Curve:
+        """Mean error against the grid's exponent a, at 201 nodes or the configured ones where fewer."""
+        size = min(201, self._layout.resolution)
+        powers = sorted({1.0, 2.0, 3.0, 5.0, self._layout.power})
+        errors = [self._on_grid(size, power) for power in powers]
+        return Curve(f"exponent a at {size} nodes", "", powers, errors, self._layout.power)
+
+    def _on_grid(self, size: int, power: float) -> float:
+        rule = brdf.integrand_of(self._config)(self._layout.step_nm)
+        table = taylor.build(self._stack, rule, size, power, self._config.scene)
+        return self._views.error(table_evaluator(table, self._config))
+
+    def _at_views(self, order: int, step_nm: float) -> float:
+        """Mean error of a Taylor series of given order and step, at the views themselves."""
+        fewer = replace(self._stack, coefficients=self._stack.coefficients[..., : order + 1])
+        plain = trapezoid(self._config.spectrum, step_nm)
+
+        def evaluate(wi: Array, wr: Array) -> Array:
+            summed = taylor.at_directions(fewer, brdf.integrand_of(self._config)(step_nm), geometry.uvw(wi, wr))
+            return brdf.direction_factor(self._config.material, plain, wi, wr)[:, None] * summed
+
+        return self._views.error(evaluate)
+
+
+class PolarStudy:
+    """Rings, azimuths, terms in |w| and wavelength step of the polar table, everything else as planned."""
+
+    def __init__(self, spectrum: PolarSpectrum, planned: plan.Plan, chosen: Evaluator, views: CoarseMap) -> None:
+        self._spectrum, self._plan, self._views = spectrum, planned, views
+        self._config = views.config
+        self._chosen = views.error(chosen)
+        self._rules = self._rules_of(planned.rings.rho())
+
+    def curves(self, has_steps: bool) -> Study:
+        """Every setting; a laser line has no wavelength step to vary."""
+        return [self.rings, self.azimuths, self.w_terms, *([self.step] if has_steps else [])]
+
+    def rings(self) -> Curve:
+        """Mean error against the number of rings."""
+        chosen = self._plan.rings.count
+        counts = sorted({max(8, round(chosen * share)) for share in (0.25, 0.35, 0.5, 0.7)} - {chosen})
+        errors = [self._of_rings(n) for n in counts]
+        return Curve("rings", "", [float(n) for n in (*counts, chosen)], [*errors, self._chosen], float(chosen))
+
+    def azimuths(self) -> Curve:
+        """Mean error against the number of azimuths: every eighth, fourth, second and all."""
+        chosen = self._plan.azimuths.count
+        skips = [skip for skip in (8, 4, 2) if chosen % (skip * TILE) == 0]
+        errors = [self._error(self._plan, self._rules, self._spectrum.thinned(skip)) for skip in skips]
+        counts = [float(chosen // skip) for skip in (*skips, 1)]
+        return Curve("azimuths", "", counts, [*errors, self._chosen], float(chosen))
+
+    def w_terms(self) -> Curve:
+        """Mean error against the Chebyshev terms in |w|."""
+        chosen = self._plan.w_terms
+        counts = sorted({4, 8, 12, chosen})
+        errors = [self._chosen if n == chosen else self._of_w_terms(n) for n in counts]
+        return Curve("terms in |w|", "", [float(n) for n in counts], errors, float(chosen))
+
+    def step(self) -> Curve:
+        """Mean error against one wavelength step for all rings; marked is the mean of the steps chosen."""
+        light, rho = self._config.spectrum, self._plan.rings.rho()
+        steps = [1.0, 2.0, 5.0, 10.0, 20.0]
+        light_of = brdf.illumination_of(self._config)
+        errors = [self._error(self._plan, quadrature.uniform(light_of(s), len(rho))) for s in steps]
+        low, high = light.range_nm
+        chosen = (high - low) / (float(np.mean(self._rules.count)) - 1.0)
+        return Curve("wavelength step", "nm", steps, errors, round(chosen, 2))
+
+    def _of_rings(self, count: int) -> float:
+        rings = replace(self._plan.rings, count=count)
+        return self._error(replace(self._plan, rings=rings), self._rules_of(rings.rho()))
+
+    def _of_w_terms(self, count: int) -> float:
+        return self._error(replace(self._plan, w_terms=count), self._rules)
+
+    def _rules_of(self, rho: Array) -> RingQuadratures:
+        tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
+        return quadrature.choose(brdf.illumination_of(self._config), rho, self._spectrum.sigma_um, tolerance)
+
+    def _error(self, planned: plan.Plan, rules: RingQuadratures, spectrum: PolarSpectrum | None = None) -> float:
+        reflectance = partial(brdf.spectral_reflectance, self._config.material, self._config.spectrum)
+        table = polar.build(spectrum or self._spectrum, planned.rings, rules, planned.w_terms, reflectance)
+        return self._views.error(table_evaluator(table, self._config))

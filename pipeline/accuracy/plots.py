@@ -1,0 +1,84 @@
+"""Plots, each returned as PNG bytes."""
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from pipeline.accuracy.checks import MapCheck
+from pipeline.accuracy.convergence import Curve
+from pipeline.optics.colour_error import pixels
+from pipeline.surface.heightfield import HeightField
+
+_DPI = 110
+_MOST_PIXELS = 512
+
+
+def png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    FigureCanvasAgg(figure)
+    # no creation time or version inside: the same data gives the same picture
+    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def height_map(field: HeightField) -> bytes:
+    """The height field in micrometres, y up."""
+    figure = Figure(figsize=(5.6, 4.6), layout="constrained")
+    axes = figure.subplots()
+    skip = max(1, max(field.shape) // _MOST_PIXELS)
+    width, height = field.size_um
+    extent = (-width / 2, width / 2, -height / 2, height / 2)
+    image = axes.imshow(
+        1e3 * field.heights_um[::skip, ::skip],
+        origin="lower",
+        extent=extent,
+        cmap="copper",
+        interpolation="antialiased",
+    )
+    axes.set(xlabel="x (µm)", ylabel="y (µm)", title="Height field")
+    figure.colorbar(image, label="height (nm)")
+    return png(figure)
+
+
+def _axes_of_map(axes: Any, title: str) -> None:
+    axes.set(xlabel="sin θ cos φ", ylabel="sin θ sin φ", title=title)
+    axes.set_xticks([-1, 0, 1])
+    axes.set_yticks([-1, 0, 1])
+
+
+def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
+    """One light's map: reference, table, and the CIELAB error between them. `light` names it."""
+    figure = Figure(figsize=(11.0, 3.7), layout="constrained")
+    panels = figure.subplots(1, 3)
+    extent = (-1, 1, -1, 1)
+    for axes, image, name in zip(panels, (check.reference, check.table), ("reference", "table"), strict=False):
+        axes.imshow(pixels(image, show_ru), extent=extent)
+        _axes_of_map(axes, f"{name}, {light}, {show_ru:g} RU")
+    error = np.where(check.views.inside, check.delta_e_image(error_ru), np.nan)
+    shown = panels[2].imshow(
+        error, extent=extent, cmap="magma", vmin=0.0, vmax=max(1e-3, np.nanpercentile(error, 99.5))
+    )
+    _axes_of_map(panels[2], f"CIELAB error, {error_ru:g} RU")
+    figure.colorbar(shown, ax=panels[2], label="ΔE*ab (1976)")
+    return png(figure)
+
+
+def convergence(curves: Sequence[Curve], exposure_ru: float) -> bytes:
+    """Mean CIELAB error against each setting, the chosen value marked."""
+    figure = Figure(figsize=(11.0, 3.2), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, len(curves)))
+    for axes, curve in zip(panels, curves, strict=True):
+        # an error below any display's reach is drawn at 1e-6 rather than off a logarithmic axis
+        axes.plot(curve.values, np.maximum(curve.errors, 1e-6), "o-", color="#2a6f97")
+        axes.axvline(curve.chosen, color="#bb3e03", linestyle="--", linewidth=1, label=f"chosen: {curve.chosen:g}")
+        axes.set_yscale("log")
+        unit = f" ({curve.unit})" if curve.unit else ""
+        axes.set(xlabel=f"{curve.setting}{unit}")
+        axes.grid(alpha=0.3, which="both")
+        axes.legend(fontsize=8)
+    panels[0].set_ylabel(f"mean ΔE at {exposure_ru:g} RU")
+    return png(figure)

@@ -1,0 +1,120 @@
+"""Reading a config file: every fault is collected before any is raised, each with its key path."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import ValidationError
+
+from pipeline.config.models import Config, Recipe, TaylorLayout
+from pipeline.errors import ConfigError
+
+_LAYOUTS = ("polar", "taylor")
+_KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
+
+
+def load(path: Path) -> Config:
+    """The config in a TOML file, with relative file paths resolved against its folder.
+
+    Raises ConfigError with every fault found.
+    """
+    source = str(path)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise ConfigError(source, [("", "no such config file")]) from None
+    except (OSError, UnicodeDecodeError) as error:
+        hint = "a config is a TOML text; for a scan see `diffract-bake inspect`"
+        raise ConfigError(source, [("", f"cannot be read as UTF-8 text ({error}); {hint}")]) from None
+    # TOMLDecodeError, and Python's own limits on digits and on depth
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(source, [("", f"not valid TOML: {error}")]) from None
+    return parse(document, source, path.resolve().parent)
+
+
+def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
+    """The config in a parsed TOML document; `folder` is what relative paths start from."""
+    try:
+        config = Config.model_validate(document, context={"folder": folder})
+    except ValidationError as error:
+        raise ConfigError(source, _merged([_fault(e) for e in error.errors()])) from None
+    faults = _scene_faults(config) + _repeated_lights(config) + _texture_faults(config)
+    if faults:
+        raise ConfigError(source, faults)
+    return config
+
+
+def _scene_faults(config: Config) -> list[tuple[str, str]]:
+    """Lights to render that the scene leaves out of the table."""
+    if config.scene is None:
+        return []
+    return [
+        (
+            f"render.lights.{i}",
+            f"no light of [scene]: theta {light.theta_deg:g}, phi {light.phi_deg:g} degrees; add it there",
+        )
+        for i, light in enumerate(config.render.lights)
+        if not any(light.same_as(other) for other in config.scene.lights)
+    ]
+
+
+def _repeated_lights(config: Config) -> list[tuple[str, str]]:
+    """Lights whose maps would be one: the same within a millionth of a degree."""
+    lights = config.render.lights
+    return [
+        (f"render.lights.{i}", f"the same light as render.lights.{j}")
+        for i in range(len(lights))
+        for j in range(i)
+        if lights[i].same_as(lights[j])
+    ]
+
+
+def _texture_faults(config: Config) -> list[tuple[str, str]]:
+    """The paper's table is an image for every power of w; only a polar one is stored at a chosen rank."""
+    if isinstance(config.table, TaylorLayout) and config.publish.textures not in ("auto", "full"):
+        return [
+            ("publish.textures", f"{config.publish.textures} textures hold a polar table only; leave it out here")
+        ]
+    return []
+
+
+def _merged(faults: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """One fault a key: a value that fits no form of a union is told once, with what each form expects."""
+    by_key: dict[str, list[str]] = {}
+    for key, text in faults:
+        by_key.setdefault(key, []).append(text)
+    return [(key, "; or ".join(dict.fromkeys(texts))) for key, texts in by_key.items()]
+
+
+def _fault(error: Any) -> tuple[str, str]:
+    """A pydantic error as (key path, one sentence)."""
+    # tags of unions ("blazed", "float") are pydantic's, not the user's keys; an unknown key is always theirs
+    unknown = error["type"] == "extra_forbidden"
+    path, last = (error["loc"][:-1], error["loc"][-1:]) if unknown else (error["loc"], ())
+    parts = [p for p in path if not (isinstance(p, str) and _is_union_tag(p, path))]
+    key = ".".join(str(p) for p in (*parts, *last))
+    if unknown:
+        return key, "unknown key (see the README's config reference)"
+    if error["type"] == "missing":
+        return key, "required, but missing"
+    if error["type"] == "model_type":
+        return key, f"expected a section (a table of keys), got {_shortened(error['input'])}"
+    if error["type"].startswith("union_tag"):
+        called = str(error["ctx"]["discriminator"]).strip("'")
+        kinds = _KINDS if called == "kind" else _LAYOUTS
+        return key, f"expected a {called}, one of {', '.join(kinds)}, got {_shortened(error['input'])}"
+    message = str(error["msg"]).removeprefix("Value error, ")
+    if error["type"] == "value_error":
+        return key, message
+    return key, f"{message[0].lower()}{message[1:]}, got {_shortened(error['input'])}"
+
+
+def _shortened(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:
+    types = {"float", "str", "int", "LaserLine", *_KINDS, *_LAYOUTS}
+    shapes = ("tuple[", "literal[", "constrained-", "function-")
+    return loc.index(part) > 0 and (part in types or part.startswith(shapes))

@@ -1,0 +1,1 @@
+"""Expansion, DFT stack, power spectrum and the exact reference."""

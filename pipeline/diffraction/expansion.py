@@ -1,0 +1,159 @@
+"""How many terms a series of exp(i k w h) needs, and how many digits it leaves.
+
+Heights enter as t = h / H in [-1, 1] and the phase as z t with z = k |w| H.
+"""
+
+from dataclasses import dataclass
+from math import exp, pi
+
+import numpy as np
+from scipy.special import jv
+
+from pipeline.config.models import LARGEST_TOLERANCE
+from pipeline.errors import AccuracyError
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature
+from pipeline.surface.heightfield import HeightField
+
+W_MAX = 2.0  # |w| = cos ti + cos tr
+_MOST_TERMS = 400
+# |P|^2 below this share of the mirror is held to an absolute error: 1e-4 of it is 1e-7 of the mirror
+MIRROR_SHARE = 1e-3
+# rms relative rounding of numbers spread evenly over a binade, in units of half an ulp at its lower end:
+# sqrt(1/3) for the position within the ulp, 2^-0.5 for that within the binade
+_ROUNDING_RMS = 0.41
+# from here on float64 cannot follow the terms either: exp(2 z) says enough
+_HOPELESS_PHASE = 40.0
+
+
+def largest_phase(half_range_um: float, lambda_min_nm: float) -> float:
+    """z = k |w| H at the shortest wavelength and normal directions, radians."""
+    return 2.0 * pi / (1e-3 * lambda_min_nm) * W_MAX * half_range_um
+
+
+@dataclass(frozen=True)
+class TaylorPlan:
+    """The Taylor series chosen for a height field.
+
+    order: N, the highest power kept ([D14] eq. 6).
+    truncation: bound on the error of exp(i k w h) by the terms left out, at the worst sample.
+    rounding: expected (rms) error of |P|^2 from tables of I_p kept in float32.
+    """
+
+    order: int
+    truncation: float
+    rounding: float
+
+    @property
+    def error(self) -> float:
+        """Predicted error of |P|^2 over max(local value, 1e-3): both amplitudes carry the truncation."""
+        return 2.0 * self.truncation + self.rounding
+
+
+def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, order: int | None = None) -> TaylorPlan:
+    """The order N for `tolerance` (or the one given), with the error it leaves.
+
+    Raises AccuracyError where no order, or not this one, reaches the tolerance in float32 tables.
+    """
+    z = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
+    # two fifths of the budget for the truncation, which enters twice; the rounding is what it is
+    chosen = order if order is not None else taylor_order(z, 0.2 * tolerance)
+    plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
+    if plan.error > tolerance:
+        raise AccuracyError(_refusal(plan, field, tolerance, order is not None))
+    return plan
+
+
+def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float, order_was_given: bool) -> str:
+    text = (
+        f"Taylor tables of order N = {plan.order} would err by {plan.error:.1e} of |P|^2 "
+        f"(terms left out {2 * plan.truncation:.1e}, float32 rounding {plan.rounding:.1e}), "
+        f"but table.tolerance asks for {tolerance:.1e}; heights span {2 * field.half_range_um:.3g} um. "
+    )
+    if order_was_given and 2.0 * plan.truncation > 0.5 * tolerance:
+        return text + 'Set table.terms = "auto", or a higher number.'
+    # half as much again: the truncation's share of the budget grows with it
+    enough = 1.5 * plan.rounding
+    if enough <= LARGEST_TOLERANCE:
+        return text + f"Set table.tolerance = {enough:.0e}, or lower the heights (a scan's: surface.clip_percentile)."
+    return text + "Lower the heights (a scan's outliers: surface.clip_percentile); no tolerance helps."
+
+
+def taylor_order(z: float, tolerance: float) -> int:
+    """Smallest N whose remainder is below `tolerance`."""
+    for order in range(1, _MOST_TERMS):
+        if _taylor_remainder(z, order) <= tolerance:
+            return order
+    return _MOST_TERMS
+
+
+def _taylor_remainder(z: float, order: int) -> float:
+    """Bound on |exp(i z t) - sum_(n <= N) (i z t)^n / n!| for |t| <= 1: z^(N+1) / (N+1)!, Lagrange."""
+    n = np.arange(1, order + 2)
+    # capped: e^700 is hopeless enough, and float64 holds it
+    return exp(min(float(np.sum(np.log(max(z, 1e-300) / n))), 700.0))
+
+
+def float32_rounding(field: HeightField, quadrature: Quadrature) -> float:
+    """Expected error of |P|^2 when I_p are rounded to float32, over max(local value, 1e-3 of the mirror).
+
+    The terms of eq. 10 cancel down to |P|^2; rounding is amplified as their sum exceeds it. Two places see the
+    worst of it, away from the mirror direction and in it. Wavelengths are averaged with the quadrature's
+    weights; the worst channel and |w| count.
+    """
+    half_ulp = float(np.finfo(np.float32).eps) / 2
+    z_max = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
+    if z_max > _HOPELESS_PHASE:
+        return half_ulp * exp(min(2.0 * z_max, 700.0))
+    t, share = _height_histogram(field)
+    return half_ulp * max(_diffuse_loss(t, share, z_max, quadrature), _specular_loss(t, share, z_max, quadrature))
+
+
+def _height_histogram(field: HeightField) -> tuple[Array, Array]:
+    """Values of t = h / H and the share of samples near each."""
+    heights = field.centred().heights_um / max(field.half_range_um, 1e-300)
+    counts, edges = np.histogram(heights, bins=512, range=(-1.0, 1.0))
+    return 0.5 * (edges[1:] + edges[:-1]), counts / counts.sum()
+
+
+def _term_factors(z: Array, z_max: float) -> Array:
+    """z^n / n! (L, n) until they are negligible."""
+    n = np.arange(1, int(3.0 * z_max) + 30)
+    return np.cumprod(np.concatenate([np.ones((len(z), 1)), z[:, None] / n], axis=1), axis=1)
+
+
+def _channel_shares(quadrature: Quadrature) -> Array:
+    """Each wavelength's share of its channel (L, 3); 0 where a channel sees nothing, as Z of a red laser."""
+    return np.asarray(quadrature.weights / np.maximum(np.abs(quadrature.weights).sum(axis=0), 1e-300))
+
+
+def _diffuse_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature) -> float:
+    """A^2, A = sum_n z^n / n! sqrt(mean t^2n): by Parseval a term has this rms where P has 1."""
+    factors = _term_factors(z_max * quadrature.lambda_min_nm / quadrature.lambda_nm, z_max)
+    root_mean_powers = np.sqrt(t ** (2 * np.arange(factors.shape[1])[:, None]) @ share)
+    weights = np.abs(_channel_shares(quadrature))
+    return float(np.max(weights.T @ (factors @ root_mean_powers) ** 2))
+
+
+def _specular_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature) -> float:
+    """rms sum of the w^p I_p over max(sum_p w^p I_p, 1e-3) at (u, v) = 0, where FT{t^n} is mean(t^n).
+
+    The roundings of different p are independent, so they add up as squares.
+    """
+    kh = z_max / W_MAX * quadrature.lambda_min_nm / quadrature.lambda_nm
+    factors = _term_factors(kh, z_max)
+    n = np.arange(factors.shape[1])
+    terms = factors * 1j**n * (t ** n[:, None] @ share)
+    products = np.array([np.convolve(g.real, g.real) + np.convolve(g.imag, g.imag) for g in terms])
+    i_p = _channel_shares(quadrature).T @ products
+    w = np.linspace(W_MAX / 32, W_MAX, 32)[:, None]
+    powers = i_p[:, None, :] * (-w) ** np.arange(i_p.shape[1])
+    rounded = _ROUNDING_RMS * np.sqrt(np.sum(powers**2, axis=-1))
+    return float(np.max(rounded / np.maximum(np.sum(powers, axis=-1), MIRROR_SHARE)))
+
+
+def chebyshev_order(z: float, tolerance: float) -> int:
+    """Smallest N with 2 sum_(n > N) |J_n(z)| <= `tolerance`: the tail of Jacobi-Anger at phase z."""
+    orders = np.arange(int(z) + 400)
+    tail: Array = 2.0 * np.cumsum(np.abs(jv(orders, z))[::-1])[::-1]
+    return max(1, int(np.argmax(tail <= tolerance)) - 1)

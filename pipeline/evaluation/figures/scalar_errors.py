@@ -1,0 +1,178 @@
+"""First orders of gratings by coupled waves and by the scalar model, over a grid of cases."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import product
+from math import pi
+from multiprocessing import get_context
+
+import numpy as np
+
+from pipeline.evaluation.figures import coupled_wave
+from pipeline.evaluation.figures.coupled_wave import Profile
+from pipeline.optics import fresnel, geometry, gratings, validity
+from pipeline.optics.geometry import Array
+from pipeline.progress import Progress
+
+# aluminium at 633 nm (Rakic 1995); the default material's ior, its k a regularisation
+METAL, DIELECTRIC = "aluminium", "n = 1.5"
+INDICES = {METAL: 1.37 + 7.62j, DIELECTRIC: 1.5 + 1e-6j}
+# u = lambda / period: where a blaze rising towards +x sends light that travels towards +x
+_ORDER = 1
+_THREADS = "OPENBLAS_NUM_THREADS"
+
+
+def cosine(x: Array) -> Array:
+    """A sinusoid between 0 and 1."""
+    return np.asarray(0.5 - 0.5 * np.cos(2.0 * pi * x))
+
+
+def sawtooth(x: Array) -> Array:
+    """A blaze rising towards +x from 0 to 1."""
+    return x
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A profile; columns: of the coarser staircase, whose layers a symmetric profile halves."""
+
+    profile: Profile
+    columns: int
+    quoted: tuple[tuple[float, ...], ...]
+
+    def power(self, s: Array, depth: Array) -> Array:
+        """|c_1|^2 at s = k w, depths from crest to valley."""
+        if self.profile is cosine:
+            return gratings.sinusoid(float(_ORDER), s, 0.5 * depth)
+        return gratings.blaze(float(_ORDER), s, depth)
+
+
+SHAPES = {"sinusoid": Shape(cosine, 24, validity.SMOOTH), "blaze": Shape(sawtooth, 16, validity.EDGED)}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One grating of many depths."""
+
+    shape: str
+    material: str
+    theta_deg: float
+    period: float
+
+    @property
+    def wi(self) -> Array:
+        """Direction to the light (3,), which travels towards +x."""
+        theta = np.radians(self.theta_deg)
+        return np.array([-np.sin(theta), 0.0, np.cos(theta)])
+
+
+@dataclass(frozen=True)
+class Efficiencies:
+    """First order (depths,), of what the flat surface reflects: rigorous, ours, and |c_1|^2 alone."""
+
+    te: Array
+    tm: Array
+    scalar: Array
+    bare: Array
+
+    @property
+    def rigorous(self) -> Array:
+        """Of unpolarised light."""
+        return 0.5 * (self.te + self.tm)
+
+    @property
+    def error(self) -> Array:
+        """Ours minus the rigorous one, of unpolarised light."""
+        return self.scalar - self.rigorous
+
+
+def rigorous(case: Case, depths: Array) -> Array:
+    """TE and TM (2, depths) over the flat surface's reflectance of unpolarised light."""
+    index, theta = INDICES[case.material], float(np.radians(case.theta_deg))
+    shape = SHAPES[case.shape]
+    grating = coupled_wave.Grating(shape.profile, case.period, theta, index)
+    found = coupled_wave.both_polarisations(grating, depths, shape.columns, _ORDER)
+    return np.asarray(found / fresnel.reflectance(np.cos(theta), index))
+
+
+def scalar(case: Case, depths: Array) -> tuple[Array, Array]:
+    """Ours and |c_1|^2 (depths,): the BRDF over the order's lobe, R(half angle) |c_1|^2 G / w^2, over R(ti)."""
+    wi = case.wi
+    wr = gratings.view_of_order(wi, float(_ORDER), 1.0 / case.period)
+    bare = SHAPES[case.shape].power(2.0 * pi * geometry.uvw(wi, wr)[2], depths)
+    index = INDICES[case.material]
+    reflected = fresnel.reflectance(geometry.cos_half(wi, wr), index) / fresnel.reflectance(wi[2], index)
+    return reflected * gratings.efficiency(bare, wi, wr), bare
+
+
+def solve(case: Case, depths: Array) -> Efficiencies:
+    """Both sides of one case."""
+    te, tm = rigorous(case, depths)
+    return Efficiencies(te, tm, *scalar(case, depths))
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes started here have one thread of BLAS: small matrices lose far more to threads than they gain.
+
+    OpenBLAS reads the environment as it loads, so this process keeps its own.
+    """
+    before = os.environ.get(_THREADS)
+    os.environ[_THREADS] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_THREADS]
+        else:
+            os.environ[_THREADS] = before
+
+
+def sweep(cases: Sequence[Case], depths: Array, progress: Progress) -> dict[Case, Efficiencies]:
+    """All cases, side by side, the longest first."""
+    longest_first = sorted(cases, key=lambda case: -case.period)
+    found = {}
+    with _one_thread_each(), ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+        for done, result in enumerate(pool.map(solve, longest_first, [depths] * len(longest_first))):
+            found[longest_first[done]] = result
+            progress("coupled waves", (done + 1) / len(longest_first))
+    return found
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Results of a grid of cases, arrays over depth (rows) and period."""
+
+    periods: Sequence[float]
+    depths: Sequence[float]
+    thetas_deg: Sequence[float]
+    results: dict[Case, Efficiencies]
+
+    def cases(self) -> list[Case]:
+        """Every shape and material in every light and period."""
+        return [Case(*each) for each in product(SHAPES, INDICES, self.thetas_deg, self.periods)]
+
+    def grid(self, shape: str, material: str, theta_deg: float, what: str) -> Array:
+        """One of the efficiencies, or the error, (depths, periods)."""
+        cases = [Case(shape, material, theta_deg, period) for period in self.periods]
+        return np.stack([getattr(self.results[case], what) for case in cases], axis=1)
+
+    def largest(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
+        """Largest size of something (depths, periods) over materials and lights."""
+        cases = [[c for c in self.cases() if c.shape == shape and c.period == period] for period in self.periods]
+        return np.stack(
+            [np.max([np.abs(what(self.results[case])) for case in each], axis=0) for each in cases], axis=1
+        )
+
+    def by_class(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
+        """The same, largest of the periods from each of the table's on and of depths up to each, table's shape."""
+        errors, periods, depths = self.largest(shape, what), np.array(self.periods), np.array(self.depths)
+        return np.array(
+            [
+                [np.max(errors[np.ix_(depths <= depth, periods >= period)], initial=0.0) for depth in validity.DEPTHS]
+                for period in validity.PERIODS
+            ]
+        )

@@ -1,0 +1,82 @@
+"""The diffraction shader of GPU Gems ch. 8 ([G04]): a grating of one spacing, a rainbow of three bumps, a highlight.
+
+It has no radiometry. Its colours, taken as linear sRGB with the highlight's peak at white, are what a display shows
+at the exposure that the config renders with; under 1 RU they are that much darker.
+"""
+
+import numpy as np
+
+from pipeline.config.models import Config
+from pipeline.errors import ConfigError
+from pipeline.optics import colour_data
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import shortest_wavelength_nm
+from pipeline.surface.heightfield import HeightField
+from pipeline.surface.statistics import dominant_periods
+from pipeline.tables.evaluate import relative_unit
+
+# [G04]'s text has eight orders, its listing's loop n = 1 .. 7
+PUBLISHED_ORDERS = 8
+# [G04] C: the width of the bumps; they peak at these y = 2 lambda - 1, lambda in um from 0.5 to 1
+_SHARPNESS = 4.0
+_PEAKS = np.array([0.75, 0.5, 0.25])  # red, green, blue
+_WHITE = (1.0, 1.0, 1.0)
+# 1/um; [G04] leaves it to the user. Of a spacing of 1 um the highlight falls to 1/e within 11 degrees of view
+DEFAULT_ROUGHNESS = 10.0
+
+
+class Gems:
+    """sum_n rainbow(d T.H / n) + highlight exp(-(r d T.H / N.H)^2), H = wi + wr, not normalised."""
+
+    source = "[G04] ch. 8"
+
+    def __init__(
+        self,
+        field: HeightField,
+        config: Config,
+        spacing_um: float | None = None,
+        direction_deg: float = 0.0,
+        orders: int = PUBLISHED_ORDERS,
+        roughness: float = DEFAULT_ROUGHNESS,
+        highlight: tuple[float, float, float] = _WHITE,
+        shown_at_ru: float | None = None,
+    ) -> None:
+        """The spacing is the surface's strongest period unless given; bands follow each other along `direction_deg`.
+
+        direction_deg: from +x. roughness: r. highlight: linear sRGB of its peak. shown_at_ru: the exposure at which a
+        display shows the shader's own colours, by default that of [render]. Raises ConfigError where the surface has
+        no period.
+        """
+        if spacing_um is None:
+            found = dominant_periods(field, 2e3 / shortest_wavelength_nm(config.spectrum), 1)
+            if not found:
+                raise ConfigError(config.name, [("spacing_um", "the surface has no period: give one")])
+            spacing_um = found[0].period_um
+        turn = np.radians(direction_deg)
+        self._tangent = np.array([np.cos(turn), np.sin(turn), 0.0])
+        self.spacing_um, self._orders, self._roughness = spacing_um, orders, roughness
+        self._highlight = np.array(highlight)
+        exposure = config.render.exposure_ru if shown_at_ru is None else shown_at_ru
+        self._unit = relative_unit(config) / exposure
+
+    @property
+    def stored_bytes(self) -> int:
+        """Spacing, direction, roughness, exposure and the highlight's colour: nothing is tabulated."""
+        return 7 * np.dtype(float).itemsize
+
+    def xyz(self, wi: Array, wr: Array) -> Array:
+        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        return np.asarray(self._unit * self.rgb(wi, wr) @ colour_data.srgb().to_xyz.T)
+
+    def rgb(self, wi: Array, wr: Array) -> Array:
+        """The shader's own colour (directions, 3), linear, not clipped."""
+        half = wi + wr
+        u = half @ self._tangent * self.spacing_um
+        error = self._roughness * u / half[:, 2]
+        return np.asarray(self._diffracted(np.abs(u)) + np.exp(-(error**2))[:, None] * self._highlight)
+
+    def _diffracted(self, u: Array) -> Array:
+        """The rainbow's colours of the wavelengths u / n, in um, that all bands reflect in phase."""
+        y = 2.0 * u[:, None] / np.arange(1, self._orders + 1) - 1.0
+        offset = _SHARPNESS * (y[..., None] - _PEAKS)
+        return np.asarray(np.maximum(1.0 - offset**2, 0.0).sum(axis=1))

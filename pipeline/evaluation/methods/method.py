@@ -1,0 +1,87 @@
+"""What every way to diffraction's colour offers: directions in, XYZ out, and what it costs."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from pipeline.config.models import Config
+from pipeline.diffraction.reference import integrate
+from pipeline.optics import brdf, geometry
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.surface.heightfield import HeightField
+
+# the step of [D14] sec. 5 and [S14] 1.3.2
+PUBLISHED_STEP_NM = 5.0
+
+
+class Method(Protocol):
+    """One way to the colour of one height field under one config's light and material.
+
+    source: where it is described. stored_bytes: of what it precomputed and keeps for its look-ups.
+    """
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def stored_bytes(self) -> int: ...
+
+    def xyz(self, wi: Array, wr: Array) -> Array:
+        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        ...
+
+
+@runtime_checkable
+class Monochromatic(Method, Protocol):
+    """A method that answers for one wavelength as well."""
+
+    def power(self, uvw: Array, lambda_nm: Array) -> Array:
+        """|P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the scan's band."""
+        ...
+
+
+Maker = Callable[[HeightField, Config], Method]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A method made ready, and the seconds that took."""
+
+    method: Method
+    seconds: float
+
+
+def prepare(make: Maker, field: HeightField, config: Config) -> Prepared:
+    """Makes a method, timed."""
+    started = time.perf_counter()
+    method = make(field, config)
+    return Prepared(method, time.perf_counter() - started)
+
+
+def integrated(
+    power: Callable[[Array, Array], Array], config: Config, wi: Array, wr: Array, step_nm: float = PUBLISHED_STEP_NM
+) -> Array:
+    """XYZ (directions, 3) of a |P|^2 given for (uvw, lambda_nm), by the trapezoidal rule ([D14] eq. 9)."""
+    quadrature = trapezoid(config.spectrum, step_nm)
+    values = power(-wi - wr, quadrature.lambda_nm)
+    return integrate(values, quadrature, config.material, config.coherence.sigma_um, wi, wr)
+
+
+def monochromatic_brdf(method: Monochromatic, config: Config, wi: Array, wr: Array, lambda_nm: Array) -> Array:
+    """f_l (directions, L) at single wavelengths in the config's normalisation ([D14] eq. 2 or 4).
+
+    In 1/sr for `absolute`. What lies beyond the scan's band is NaN.
+    """
+    material, light = config.material, trapezoid(config.spectrum, PUBLISHED_STEP_NM)
+    single = Quadrature(lambda_nm, np.ones((len(lambda_nm), 3)))
+    inside = brdf.spectral_reflectance(material, config.spectrum, lambda_nm, geometry.cos_half(wi, wr))
+    inside = inside * brdf.window_area(material, single, config.coherence.sigma_um)
+    if material.fresnel == "conductor":
+        outside = brdf.geometry_factor(material, wi, wr)
+    else:
+        outside = brdf.direction_factor(material, light, wi, wr)
+    return np.asarray((outside / wi[:, 2])[:, None] * inside * method.power(geometry.uvw(wi, wr), lambda_nm))

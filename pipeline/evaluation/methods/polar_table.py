@@ -1,0 +1,79 @@
+"""This project's table as a method: polar, planned for the config's error budget."""
+
+from functools import cached_property, partial
+
+import numpy as np
+
+from pipeline.config.models import Config, PolarLayout
+from pipeline.diffraction.dft_stack import crop_to_window
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.reference import in_band
+from pipeline.optics import brdf
+from pipeline.optics.geometry import Array
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.planning import plan
+from pipeline.tables.planning.plan import Budget, Plan
+from pipeline.tables.polar import quadrature, spectral
+from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.spectral import SpectralTable
+from pipeline.tables.polar.table import PolarTable
+
+
+class PolarTableMethod:
+    """XYZ from rings and azimuths of splines; |P|^2 from the spectral form, which is made when first asked for.
+
+    Of a larger scan it shows the window in the middle, as every method here does. What a config's [scene] does not
+    reach is NaN.
+    """
+
+    source = "this project: polar power spectrum, integrated ring by ring"
+
+    def __init__(self, field: HeightField, config: Config) -> None:
+        """Raises AccuracyError where the budget is out of reach; DeviceError where no device works."""
+        self._field, self._config = crop_to_window(field, config.coherence.sigma_um).centred(), config
+        self._layout = config.table if isinstance(config.table, PolarLayout) else PolarLayout()
+        self._table = self._integrated(*self._planned(self._layout))
+        self._look_up = table_evaluator(self._table, config)
+
+    @property
+    def stored_bytes(self) -> int:
+        """Of the table of XYZ; the spectral form is apart, `spectral_bytes`."""
+        return self._table.values.nbytes
+
+    @property
+    def spectral_bytes(self) -> int:
+        """Of the spectral form, which answers single wavelengths."""
+        return self._spectral.values.nbytes
+
+    def xyz(self, wi: Array, wr: Array) -> Array:
+        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        return self._look_up(wi, wr)
+
+    def power(self, uvw: Array, lambda_nm: Array) -> Array:
+        """|P|^2 (directions, L); NaN beyond the scan's band."""
+        found = spectral.look_up(self._spectral, uvw, lambda_nm)
+        return np.where(in_band(self._field, uvw, 1e-3 * lambda_nm), found, np.nan)
+
+    @cached_property
+    def _spectral(self) -> SpectralTable:
+        """The power spectrum on a grid planned for single wavelengths, not for the integral of many."""
+        single = self._layout.model_copy(update={"form": "spectral"})
+        return spectral.build(self._planned(single)[0])
+
+    @property
+    def _budget(self) -> Budget:
+        return Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru)
+
+    def _planned(self, layout: PolarLayout) -> tuple[PolarSpectrum, Plan]:
+        config = self._config
+        return plan.make(
+            [self._field], config.coherence.sigma_um, config.spectrum, config.scene, self._budget, layout
+        )
+
+    def _integrated(self, made: PolarSpectrum, chosen: Plan) -> PolarTable:
+        config, rho = self._config, chosen.rings.rho()
+        light, sigma_um = brdf.illumination_of(config), config.coherence.sigma_um
+        rules = quadrature.choose(light, rho, sigma_um, self._budget.quadrature)
+        reflectance = partial(brdf.spectral_reflectance, config.material, config.spectrum)
+        return polar.build(made, chosen.rings, rules, chosen.w_terms, reflectance)

@@ -1,0 +1,49 @@
+"""What each compile-time constant of a polar table's kernels buys: its kernels' time with another value."""
+
+from dataclasses import dataclass
+
+from kernels import blocks
+from pipeline.evaluation.speed import polar_bake
+from pipeline.evaluation.speed.setting import Setting
+from pipeline.progress import Progress, silent
+
+# by the constant's name, the kernels that it is for
+_KERNELS = {
+    "STEP_X": ("along_x",),
+    "STEP_Y": ("along_y",),
+    "KEPT": ("along_x", "along_y"),
+    "S_BLOCK": ("polar_spectrum",),
+    "RADII": ("polar_spectrum",),
+    "USUAL_TAPS": ("polar_spectrum",),
+    "W_BLOCK": ("apply_operator",),
+    "SHARE_BLOCK": ("apply_operator",),
+}
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant's value here, another one, and the seconds of its kernels with either."""
+
+    name: str
+    value: int
+    seconds: float
+    other_value: int
+    other_s: float
+
+
+def measure(setting: Setting, repeats: int, progress: Progress = silent) -> list[Constant]:
+    """Every constant beside another value; both are timed one after the other, for a machine's pace changes."""
+    found = []
+    for done, (name, kernels) in enumerate(_KERNELS.items(), 1):
+        value, other = blocks.chosen(name)[name], blocks.OTHERS[name]
+        with blocks.instead(**{name: other}):
+            other_s = _seconds(setting, repeats, kernels)
+        found.append(Constant(name, value, _seconds(setting, repeats, kernels), other, other_s))
+        progress("constants", done / len(_KERNELS))
+    return found
+
+
+def _seconds(setting: Setting, repeats: int, kernels: tuple[str, ...]) -> float:
+    """The fastest run of each kernel, added up."""
+    best = polar_bake.bake(setting, repeats).kernel_s
+    return sum(best[kernel] for kernel in kernels)

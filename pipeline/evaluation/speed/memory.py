@@ -1,0 +1,63 @@
+"""Peak memory of a bake, stack to table, in a process of its own.
+
+Run as a script it is that process: a file of heights, its pitch along x and y, a config and a layout as JSON.
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.config.models import Config, Mirror, PolarLayout, Surface
+from pipeline.evaluation.speed import setting
+from pipeline.surface.heightfield import HeightField
+
+# a large scan: as fine as a snake's, and so tall that it needs 64 terms
+LARGE_SIDE = 4096
+_LARGE_PITCH_UM, _LARGE_HALF_RANGE_UM = 65.0 / 1332, 1.35
+_SEED = 5
+
+
+def peak_bytes(field: HeightField, config: Config, layout: PolarLayout) -> int:
+    """The most memory that a fresh process held while it made a height field's stack, spectrum and table."""
+    with tempfile.TemporaryDirectory() as folder:
+        heights = Path(folder) / "heights.npy"
+        np.save(heights, field.heights_um)
+        command = [sys.executable, "-m", "pipeline.evaluation.speed.memory", str(heights), *map(str, field.pitch_um)]
+        models = [model.model_dump_json() for model in (config, layout)]
+        told = subprocess.run([*command, *models], capture_output=True, text=True, check=True)
+    return int(told.stdout)
+
+
+def large_scan() -> tuple[HeightField, Config]:
+    """A rough surface of 4096 x 4096 samples."""
+    half = _LARGE_HALF_RANGE_UM
+    heights = np.random.default_rng(_SEED).uniform(-half, half, (LARGE_SIDE, LARGE_SIDE))
+    config = Config(name="large", surface=Surface(recipe=Mirror(kind="mirror")))
+    return HeightField(heights, (_LARGE_PITCH_UM, _LARGE_PITCH_UM)), config
+
+
+def _bake(arguments: list[str]) -> int:
+    """Makes a table as `arguments` say and gives the peak of this process's memory, bytes."""
+    heights, pitch_x, pitch_y, config, layout = arguments
+    field = HeightField(np.load(heights), (float(pitch_x), float(pitch_y)))
+    made, chosen = setting.first_bake(
+        field, Config.model_validate_json(config), PolarLayout.model_validate_json(layout)
+    )
+    chosen.table(made, chosen.light)
+    return _high_water_bytes()
+
+
+def _high_water_bytes() -> int:
+    """This process's own peak: getrusage's starts at what the parent held when it called exec."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    found = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
+    assert found is not None
+    return 1024 * int(found[1])
+
+
+if __name__ == "__main__":
+    print(_bake(sys.argv[1:]))

@@ -1,0 +1,156 @@
+"""The polar table by FINUFFT: what the best library route to the same numbers costs.
+
+Every F_n(f), f = (u, v) / lambda, of every texel and wavelength is a 2D sum over uniform samples at a nonuniform
+frequency, a type-2 transform. How FINUFFT is made to do its best:
+
+- The patch repeats under the window, and its copies meet other phases at every f. So the patch is laid side by side
+  under the whole window and transformed once; a window folded onto one patch would need other samples at every f.
+- No view reaches beyond 2 / lambda_min. The terms are low-passed to that first and sampled no more finely: about a
+  quarter of a 0.05 um scan's samples, and the same sums.
+- Terms are transformed together, in single precision, by all threads, with the faster of both upsampling factors.
+  Heights are real, so half of the azimuths do.
+- In the DFT domain the window's few weights over the patch's own coefficients would do. That is this project's
+  kernel: FINUFFT's interpolation has a window of its own and cannot apply the Gaussian one.
+
+It runs on some of the azimuths, side by side as in the whole. What grows with the points is scaled by their number;
+what does not (terms, FFTs) counts once, as if the memory held the transforms of all points together.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.evaluation.speed import nufft_modes
+from pipeline.evaluation.speed.nufft_modes import Complex, Modes
+from pipeline.evaluation.speed.setting import Setting
+from pipeline.evaluation.speed.timing import best_of
+from pipeline.optics.geometry import Array
+
+_TOLERANCE = 1e-5
+_UPSAMPLING = (1.25, 2.0)
+
+
+def available() -> bool:
+    """Whether the library is installed: it is an extra."""
+    return find_spec("finufft") is not None
+
+
+@dataclass(frozen=True)
+class NufftRun:
+    """FINUFFT on some of a table's points.
+
+    fixed_s: terms and their FFTs. transform_s, integral_s: seconds a point, for all terms. points: those transformed,
+    (texel, wavelength) pairs of half a turn. samples: X, Y, Z (rings, 3, w nodes, 2 azimuths), those half a turn on
+    last.
+    """
+
+    fixed_s: float
+    transform_s: float
+    integral_s: float
+    points: int
+    upsampling: float
+    samples: NDArray[np.float32]
+
+    def seconds(self, setting: Setting) -> float:
+        """What a whole table takes."""
+        return self.fixed_s + (self.transform_s + self.integral_s) * points_of(setting)
+
+
+def points_of(setting: Setting) -> int:
+    """Frequencies at which a table needs its transforms: wavelengths of all rings, over half of the azimuths."""
+    return int(np.sum(setting.rules.count)) * setting.plan.azimuths.count // 2
+
+
+def run(setting: Setting, azimuths: int, repeats: int) -> NufftRun:
+    """FINUFFT on the first `azimuths` of a setting's table, everything the best of `repeats`."""
+    modes, modes_s = best_of(repeats, lambda: nufft_modes.make(setting))
+    fx, fy = _frequencies(setting, azimuths)
+    tried = [_transform(modes, fx, fy, upsampling, repeats) for upsampling in _UPSAMPLING]
+    best = min(tried, key=lambda t: t.fft_s + t.point_s * points_of(setting))
+    band_x, band_y = setting.field.band_limit_per_um
+    best.f_n[:, (np.abs(fx) > band_x) | (np.abs(fy) > band_y)] = 0.0
+    series = [setting.series(ring) for ring in range(setting.plan.rings.count)]
+    samples, integral_s = best_of(repeats, lambda: _integrate(setting, best.f_n, series))
+    return NufftRun(modes_s + best.fft_s, best.point_s, integral_s / fx.size, fx.size, best.upsampling, samples)
+
+
+def _frequencies(setting: Setting, azimuths: int) -> tuple[Array, Array]:
+    """(fx, fy) of all wavelengths of all rings, one ring after the other, (wavelengths, azimuths), 1/um."""
+    rings = enumerate(setting.plan.rings.rho())
+    r = np.concatenate([rho / (1e-3 * setting.rule_of_ring(ring).lambda_nm) for ring, rho in rings])
+    phi = setting.plan.azimuths.angles()[:azimuths]
+    return np.outer(r, np.cos(phi)), np.outer(r, np.sin(phi))
+
+
+@dataclass(frozen=True)
+class _Transformed:
+    """F_n (terms, wavelengths, azimuths), and the seconds its FFTs took and each point beyond them."""
+
+    f_n: Complex
+    fft_s: float
+    point_s: float
+    upsampling: float
+
+
+def _transform(modes: Modes, fx: Array, fy: Array, upsampling: float, repeats: int) -> _Transformed:
+    import finufft
+
+    terms = len(modes.values)
+    plan: Any = finufft.Plan(
+        2,
+        modes.values.shape[1:],
+        n_trans=terms,
+        eps=_TOLERANCE,
+        isign=1,
+        dtype="complex64",
+        upsampfac=upsampling,
+        nthreads=os.cpu_count() or 1,
+        showwarn=0,
+    )
+    # radians a sample
+    x, y = ((2.0 * pi * d * f.ravel()).astype(np.float32) for d, f in zip(modes.spacing_um, (fx, fy), strict=True))
+
+    def at(points: int) -> Complex:
+        # the modes' first axis is y
+        plan.setpts(y[:points], x[:points])
+        return np.asarray(plan.execute(modes.values))
+
+    # the first run plans its FFTs; one point costs no more than they do
+    at(1)
+    _, fft_s = best_of(repeats, lambda: at(1))
+    f_n, seconds = best_of(repeats, lambda: at(x.size))
+    return _Transformed(f_n.reshape(terms, *fx.shape), fft_s, max(seconds - fft_s, 0.0) / x.size, upsampling)
+
+
+def _integrate(setting: Setting, f_n: Complex, series: list[NDArray[np.complex128]]) -> NDArray[np.float32]:
+    """XYZ (rings, 3, w nodes, 2 azimuths) of both half turns, from F_n (terms, wavelengths, azimuths) of one."""
+    end = np.cumsum(setting.rules.count)
+
+    def ring(i: int) -> NDArray[np.float32]:
+        part = f_n[:, end[i] - setting.rules.count[i] : end[i]].transpose(1, 0, 2)
+        factors = series[i][..., : len(f_n)]
+        # the factors of even terms are real, of odd terms imaginary: P(f) = even - i odd
+        even, odd = _sum(factors[..., ::2].real, part[:, ::2]), _sum(-factors[..., 1::2].imag, part[:, 1::2])
+        # heights are real, so P(-f) takes the conjugates of F_n
+        power = np.concatenate([_squared(even - 1j * odd), _squared(even + 1j * odd)], axis=-1)
+        weights = setting.rule_of_ring(i).weights.T.astype(np.float32)
+        return np.asarray((weights @ power.reshape(len(power), -1)).reshape(3, *power.shape[1:]))
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return np.stack(list(pool.map(ring, range(len(series)))))
+
+
+def _sum(factors: Array, terms: Complex) -> Complex:
+    """Sums of complex terms (..., n, azimuths) with real factors (..., w, n): a product of real matrices."""
+    parts = np.ascontiguousarray(terms).view(np.float32)
+    return np.asarray(np.matmul(factors.astype(np.float32), parts)).view(np.complex64)
+
+
+def _squared(amplitude: Complex) -> NDArray[np.float32]:
+    return np.asarray(amplitude.real**2 + amplitude.imag**2)

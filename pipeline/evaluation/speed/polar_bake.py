@@ -1,0 +1,102 @@
+"""The polar table, stage by stage, warm; and the same table under a second light."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from kernels import device
+from kernels.device import Launch
+from pipeline.config.models import LaserLine
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.evaluation.speed import work
+from pipeline.evaluation.speed.machine import Timed
+from pipeline.evaluation.speed.setting import Setting
+from pipeline.evaluation.speed.timing import best_of, timed
+from pipeline.tables.polar.table import PolarTable
+
+SECOND_ILLUMINANT = "A"
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Seconds of one bake's stages."""
+
+    stack: float
+    spectrum: float
+    table: float
+
+    @property
+    def total(self) -> float:
+        return self.stack + self.spectrum + self.table
+
+
+@dataclass(frozen=True)
+class PolarBake:
+    """What was made, the times of the fastest bake, and every kernel's best.
+
+    second_light_s: wavelengths and table of the same spectrum under another illuminant; None for a laser line.
+    kernel_s: by the kernel's name, its fastest run.
+    """
+
+    built: Stack
+    made: PolarSpectrum
+    table: PolarTable
+    stages: Stages
+    second_light_s: float | None
+    kernel_s: dict[str, float]
+
+
+def bake(setting: Setting, repeats: int) -> PolarBake:
+    """Bakes a table several times over; the kernels must have been compiled."""
+    setting.table(setting.spectrum(setting.stack()), setting.light)
+    with device.timing() as launches:
+        runs = [_once(setting) for _ in range(repeats)]
+    built, made, table, _ = runs[-1]
+    best = min((stages for *_, stages in runs), key=lambda stages: stages.total)
+    return PolarBake(built, made, table, best, _second_light(setting, made, repeats), _fastest(launches))
+
+
+def best(first: PolarBake, again: PolarBake) -> PolarBake:
+    """The better times of two bakes of one setting: what else a machine does comes in bursts of seconds."""
+    lights = [bake.second_light_s for bake in (first, again) if bake.second_light_s is not None]
+    return replace(
+        first,
+        stages=min(first.stages, again.stages, key=lambda stages: stages.total),
+        second_light_s=min(lights, default=None),
+        kernel_s={kernel: min(seconds, again.kernel_s[kernel]) for kernel, seconds in first.kernel_s.items()},
+    )
+
+
+def _once(setting: Setting) -> tuple[Stack, PolarSpectrum, PolarTable, Stages]:
+    built, stack_s = timed(setting.stack)
+    made, spectrum_s = timed(lambda: setting.spectrum(built))
+    table, table_s = timed(lambda: setting.table(made, setting.light))
+    return built, made, table, Stages(stack_s, spectrum_s, table_s)
+
+
+def _second_light(setting: Setting, made: PolarSpectrum, repeats: int) -> float | None:
+    if isinstance(setting.light.illuminant, LaserLine):
+        return None
+    other = setting.light.model_copy(update={"illuminant": SECOND_ILLUMINANT})
+    return best_of(repeats, lambda: setting.table(made, other))[1]
+
+
+def _fastest(launches: Iterable[Launch]) -> dict[str, float]:
+    seconds: dict[str, float] = defaultdict(lambda: float("inf"))
+    for launch in launches:
+        seconds[launch.kernel] = min(seconds[launch.kernel], launch.seconds)
+    return dict(seconds)
+
+
+def stages(setting: Setting, baked: PolarBake) -> list[Timed]:
+    """What each stage needs and how long it took; of kernels, their best run."""
+    seconds = baked.kernel_s
+    spline_s = seconds["filter_azimuths"] + seconds["filter_rings"]
+    return [
+        Timed(work.stack(setting.field, baked.built), baked.stages.stack),
+        Timed(work.spectrum(setting, baked.built, baked.made), seconds["polar_spectrum"]),
+        Timed(work.build_operator(setting), seconds["build_operator"]),
+        Timed(work.apply_operator(setting, baked.made, baked.table), seconds["apply_operator"]),
+        Timed(work.splines(baked.table), spline_s),
+    ]

@@ -1,0 +1,308 @@
+"""Everything that is measured on one surface."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.accuracy.checks import MAP_SIZE, RelativeError, relative_error
+from pipeline.bundle import polar_storage
+from pipeline.bundle.polar_storage import Stored
+from pipeline.config.models import Config, PolarLayout
+from pipeline.errors import AccuracyError
+from pipeline.evaluation.speed import memory, nufft, plain, polar_bake, setting, transforms
+from pipeline.evaluation.speed.machine import Timed
+from pipeline.evaluation.speed.nufft import NufftRun
+from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM, Paper, PaperTable
+from pipeline.evaluation.speed.polar_bake import PolarBake, Stages
+from pipeline.evaluation.speed.setting import Setting
+from pipeline.evaluation.speed.timing import best_of, timed
+from pipeline.evaluation.speed.transforms import Transforms
+from pipeline.evaluation.speed.truth import MapTruth
+from pipeline.optics.colour_error import ColourError
+from pipeline.optics.geometry import Array
+from pipeline.progress import Progress, silent
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar.compression import compress, most_textures, whole
+
+PAPER, POLAR, TEXTURES = "paper's tables", "polar table", "polar table as RGBA16F"
+NUFFT = "polar table by FINUFFT"
+NUMPY_PAPER, NUMPY_POLAR = "paper's tables in plain numpy", "polar table in plain numpy"
+METHODS = (PAPER, POLAR, TEXTURES, NUFFT, NUMPY_PAPER, NUMPY_POLAR)
+# 251 k texels beside the paper's 501 x 501; and as many for a grating, whose light lies on a line: fewer azimuths do
+MAIN = PolarLayout(rings=140, azimuths=1792)
+GRATING = PolarLayout(rings=300, azimuths=832, w_terms=12)
+# of the mirror: what is darker is compared with it, not with itself
+_FLOOR = 1e-7
+_SEED = 3
+_GRATING_STRETCH = 0.5
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured: grids as (resolution, step in nm) and layouts, textures, samples, repeats.
+
+    bakes: of the layout MAIN, before and after the other routes.
+    """
+
+    map_size: int
+    paper: tuple[tuple[int, float], ...]
+    polar: tuple[PolarLayout, ...]
+    textures: tuple[int, ...]
+    bakes: int
+    repeats: int
+    numpy_nodes: int
+    nufft_azimuths: int
+    nufft_repeats: int
+    memory: bool
+
+
+FULL = Effort(
+    map_size=MAP_SIZE,
+    paper=(
+        *((resolution, STEP_NM) for resolution in (101, 151, 201, 301, 401, RESOLUTION, 701)),
+        *((RESOLUTION, step) for step in (20.0, 10.0, 2.0)),
+    ),
+    polar=(
+        *(PolarLayout(rings=r, azimuths=a) for r, a in ((50, 640), (70, 896), (100, 1280))),
+        MAIN,
+        GRATING,
+        *(PolarLayout(rings=r, azimuths=a) for r, a in ((200, 2560), (280, 3584))),
+    ),
+    textures=(2, 3, 4, 6),
+    bakes=25,
+    repeats=5,
+    numpy_nodes=8,
+    nufft_azimuths=32,
+    nufft_repeats=2,
+    memory=True,
+)
+QUICK = replace(
+    FULL,
+    map_size=101,
+    paper=((201, STEP_NM), (201, 20.0)),
+    polar=(MAIN,),
+    textures=(3,),
+    bakes=5,
+    repeats=2,
+    numpy_nodes=2,
+    nufft_azimuths=16,
+    nufft_repeats=1,
+    memory=False,
+)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way to make one table: what it costs and how far its map is from the exact one.
+
+    settings: resolution and step_nm, or rings and azimuths and, where compressed, textures. texels: of the grid.
+    bytes: of the table as float32, or of its textures.
+    scaled: whether the seconds are those of a sample, scaled by its size.
+    """
+
+    method: str
+    settings: dict[str, float]
+    texels: int
+    seconds: float
+    bytes: int
+    error: ColourError
+    scaled: bool = False
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How two ways to the same numbers differ: of samples over max(sample, 1e-7 of the mirror)."""
+
+    nufft: RelativeError | None
+    numpy: RelativeError
+
+
+@dataclass(frozen=True)
+class SurfaceBench:
+    """What was measured on a surface.
+
+    stages and second_light_s: of the polar table of layout MAIN. memory_bytes: the peak of a process that bakes
+    it. notes: what was left out, and why.
+    """
+
+    name: str
+    samples: tuple[int, int]
+    sigma_um: float
+    map_size: int
+    terms: int
+    nodes: int
+    w_terms: int
+    points: list[Point]
+    stages: Stages
+    second_light_s: float | None
+    timed: list[Timed]
+    transforms: list[Transforms]
+    agreement: Agreement
+    nufft_upsampling: float | None
+    memory_bytes: int | None
+    notes: list[str]
+
+    def point(self, method: str, **settings: float) -> Point | None:
+        """The point of a method at given settings, where it was measured."""
+        return next((p for p in self.points if p.method == method and p.settings == settings), None)
+
+
+def settings_of(layout: PolarLayout) -> dict[str, float]:
+    """What tells one polar table from another."""
+    return {
+        key: value
+        for key, value in layout.model_dump(include={"rings", "azimuths", "w_terms"}).items()
+        if value != "auto"
+    }
+
+
+def run(config: Config, field: HeightField, effort: Effort, progress: Progress = silent) -> SurfaceBench:
+    """Measures one surface. Its scene, table and accuracy sections are left aside."""
+    return _Suite(config, field, effort, progress).run()
+
+
+class _Suite:
+    """One surface's measurements, in order; points and notes as they come."""
+
+    def __init__(self, config: Config, field: HeightField, effort: Effort, progress: Progress) -> None:
+        self._config, self._field, self._effort, self._progress = config, field, effort, progress
+        self._points: list[Point] = []
+        self._stages: list[Timed] = []
+        self._notes: list[str] = []
+
+    def run(self) -> SurfaceBench:
+        effort, config, field = self._effort, self._config, self._field
+        self._truth = MapTruth(field, config, effort.map_size, self._progress)
+        main = setting.make(field, config, MAIN)
+        baked = polar_bake.bake(main, effort.bakes)
+        samples = main.samples(baked.made)
+        numpy_pair_s, numpy_agrees = self._numpy(main, baked, samples)
+        routed, nufft_agrees = self._nufft(main, samples)
+        baked = polar_bake.best(baked, polar_bake.bake(main, effort.bakes))
+        self._stages += polar_bake.stages(main, baked)
+        self._polar(main, baked, routed, numpy_pair_s)
+        self._textures(main, baked)
+        self._paper()
+        measured = transforms.measure(main, effort.repeats)
+        self._progress("the stack's transforms", 1.0)
+        return SurfaceBench(
+            name=config.name,
+            samples=field.shape,
+            sigma_um=main.sigma_um,
+            map_size=effort.map_size,
+            terms=main.plan.terms,
+            nodes=main.plan.s_nodes,
+            w_terms=main.plan.w_terms,
+            points=self._points,
+            stages=baked.stages,
+            second_light_s=baked.second_light_s,
+            timed=self._stages,
+            transforms=measured,
+            agreement=Agreement(nufft_agrees, numpy_agrees),
+            nufft_upsampling=routed.upsampling if routed else None,
+            memory_bytes=memory.peak_bytes(field, config, MAIN) if effort.memory else None,
+            notes=self._notes,
+        )
+
+    def _numpy(self, main: Setting, baked: PolarBake, samples: Array) -> tuple[float, RelativeError]:
+        """Seconds of plain numpy for a (texel, wavelength) pair, and how it agrees with the table's samples."""
+        rng = np.random.default_rng(_SEED)
+        rings = np.linspace(1, main.plan.rings.count - 1, self._effort.numpy_nodes).astype(int)
+        azimuths = rng.integers(main.plan.azimuths.count, size=len(rings))
+        rho, phi = main.plan.rings.rho()[rings], main.plan.azimuths.angles()[azimuths]
+        uv = np.stack([rho * np.cos(phi), rho * np.sin(phi)], axis=-1)
+        # what all azimuths of a ring share is made beforehand
+        series = [main.series(ring) for ring in rings]
+        coefficients = plain.complex_coefficients(baked.built)
+
+        def texels() -> Array:
+            each = zip(rings, uv, series, strict=True)
+            return np.stack(
+                [plain.polar_texel(baked.built, coefficients, main.rule_of_ring(r), at, j) for r, at, j in each]
+            )
+
+        found, seconds = best_of(2, texels)
+        pairs = int(np.sum(main.rules.count[rings]))
+        self._progress("plain numpy", 1.0)
+        return seconds / pairs, relative_error(samples[rings, :, :, azimuths], found, _FLOOR)
+
+    def _nufft(self, main: Setting, samples: Array) -> tuple[NufftRun | None, RelativeError | None]:
+        if not nufft.available():
+            self._notes.append("FINUFFT is not installed (the extra `bench`), so there is nothing by it")
+            return None, None
+        routed = nufft.run(main, self._effort.nufft_azimuths, self._effort.nufft_repeats)
+        azimuths, half = self._effort.nufft_azimuths, main.plan.azimuths.count // 2
+        here = np.concatenate([samples[..., :azimuths], samples[..., half : half + azimuths]], axis=-1)
+        self._progress("FINUFFT", 1.0)
+        return routed, relative_error(routed.samples.astype(np.float64), here, _FLOOR)
+
+    def _polar(self, main: Setting, baked: PolarBake, routed: NufftRun | None, numpy_pair_s: float) -> None:
+        """The polar table over its grid; the same tables by FINUFFT and by plain numpy, which err by as much."""
+        grating = main.plan.azimuths.stretch < _GRATING_STRETCH
+        layouts = [layout for layout in self._effort.polar if layout != GRATING or grating]
+        for i, layout in enumerate(layouts):
+            chosen, made = main, baked
+            if layout != MAIN:
+                chosen = setting.make(self._field, self._config, layout)
+                made = polar_bake.bake(chosen, self._effort.repeats)
+            pairs = int(np.sum(chosen.rules.count)) * chosen.plan.azimuths.count
+            point = Point(
+                POLAR,
+                settings_of(layout),
+                chosen.plan.texels,
+                made.stages.total,
+                made.table.values.nbytes,
+                self._truth.error(made.table),
+            )
+            self._points += [
+                point,
+                replace(point, method=NUMPY_POLAR, seconds=numpy_pair_s * pairs, scaled=True),
+            ]
+            if routed:
+                self._points.append(replace(point, method=NUFFT, seconds=routed.seconds(chosen), scaled=True))
+            self._progress("polar tables", (i + 1) / len(layouts))
+
+    def _textures(self, main: Setting, baked: PolarBake) -> None:
+        """The polar table in few RGBA textures of half floats."""
+        most = most_textures(baked.table)
+        for count in sorted({min(count, most) for count in self._effort.textures}):
+
+            def store(count: int = count) -> Stored:
+                whole_or_less = whole(baked.table) if count == most else compress(baked.table, count, None)
+                return polar_storage.store(whole_or_less, "half")
+
+            stored, seconds = timed(store)
+            self._points.append(
+                Point(
+                    TEXTURES,
+                    {**settings_of(MAIN), "textures": count},
+                    main.plan.texels,
+                    baked.stages.total + seconds,
+                    stored.values.nbytes,
+                    self._truth.error_of_textures(stored.textures),
+                )
+            )
+        self._progress("textures", 1.0)
+
+    def _paper(self) -> None:
+        """The paper's tables over their resolution and step, by the kernel and by plain numpy."""
+        try:
+            paper = Paper(self._field, self._config, self._effort.repeats)
+        except AccuracyError as error:
+            self._notes.append(f"no tables of the paper's: {error}")
+            return
+        numpy_pair_s, agreement = paper.numpy_pair_s(self._effort.numpy_nodes)
+        self._notes.append(f"the paper's kernel and plain numpy differ by {agreement:.0e} of the largest I_p")
+        for i, (resolution, step_nm) in enumerate(self._effort.paper):
+            made = paper.table(resolution, step_nm)
+            if (resolution, step_nm) == max(self._effort.paper):
+                self._stages.append(paper.stage(made))
+            point = self._paper_point(made, resolution, step_nm)
+            numpy_s = numpy_pair_s * made.pairs
+            self._points += [point, replace(point, method=NUMPY_PAPER, seconds=numpy_s, scaled=True)]
+            self._progress("the paper's tables", (i + 1) / len(self._effort.paper))
+
+    def _paper_point(self, made: PaperTable, resolution: int, step_nm: float) -> Point:
+        settings = {"resolution": float(resolution), "step_nm": step_nm}
+        size = made.table.values.nbytes
+        return Point(PAPER, settings, resolution**2, made.seconds, size, self._truth.error(made.table))

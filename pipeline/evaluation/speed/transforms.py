@@ -1,0 +1,86 @@
+"""The stack's transforms by three routes: the kernel, FFTW and scipy, each in both precisions."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from kernels.dft_stack import Kept
+from pipeline.diffraction import dft_stack as stack
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.evaluation.speed.setting import AMPLITUDE, Setting
+from pipeline.evaluation.speed.timing import best_of
+from pipeline.fourier.term_transforms import KeptPlaces, transform
+
+Precision = Literal["single", "double"]
+_REAL: dict[Precision, np.dtype[Any]] = {"single": np.dtype(np.float32), "double": np.dtype(np.float64)}
+
+
+@dataclass(frozen=True)
+class Transforms:
+    """Seconds of one Chebyshev stack by each route, its terms included, warm.
+
+    differences: the largest of FFTW's and of scipy's coefficients from the kernel's; a mirror's is 1.
+    """
+
+    precision: Precision
+    terms: int
+    kernel_s: float
+    fftw_s: float
+    scipy_s: float
+    fftw_difference: float
+    scipy_difference: float
+
+
+def measure(setting: Setting, repeats: int) -> list[Transforms]:
+    """Both precisions of the stack that a surface's polar table is made of."""
+    return [_measure(setting, precision, repeats) for precision in _REAL]
+
+
+def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms:
+    real, reach = _REAL[precision], float(setting.radius_per_um[-1])
+    terms, t = setting.plan.terms, np.fft.ifftshift(setting.field.heights_um) * stack.scale_per_um(setting.field)
+
+    def by_kernel() -> Stack:
+        return stack.build(setting.field, "chebyshev", terms, setting.sigma_um, reach, AMPLITUDE, dtype=real)
+
+    kept = kept_of(by_kernel())
+    shape = (*kept.shape, 2, terms)
+
+    def by_fftw() -> NDArray[Any]:
+        out = np.empty(shape, real)
+        transform(_polynomials(t), kept, out)
+        return out
+
+    def by_scipy() -> NDArray[Any]:
+        out, places = np.empty(shape, real), KeptPlaces(t.shape, kept)
+        for n, term in zip(range(terms), _polynomials(t), strict=False):
+            places.put(fft.rfft2(term.astype(real), workers=os.cpu_count()), out[..., n])
+        return out
+
+    # plans are made, or read from wisdom, once
+    by_fftw()
+    built, kernel_s = best_of(repeats, by_kernel)
+    fftw, fftw_s = best_of(repeats, by_fftw)
+    scipy, scipy_s = best_of(repeats, by_scipy)
+    differences = (float(np.max(np.abs(other - built.coefficients))) for other in (fftw, scipy))
+    return Transforms(precision, terms, kernel_s, fftw_s, scipy_s, *differences)
+
+
+def kept_of(built: Stack) -> Kept:
+    """The frequencies of a stack."""
+    columns = built.coefficients.shape[1]
+    return Kept(built.row_zero, columns - built.column_zero - 1, built.column_zero)
+
+
+def _polynomials(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """T_0(t), T_1(t), ... without end."""
+    before, term = t, np.ones_like(t)
+    while True:
+        yield term
+        # T_-1 = T_1 = t
+        before, term = term, 2.0 * t * term - before

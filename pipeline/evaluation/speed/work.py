@@ -1,0 +1,98 @@
+"""How much the stages need: operations that the algorithm asks for, and bytes that must move at least once.
+
+Padding to whole vectors is no work, and a fused multiply-add is two operations. Bytes are those of inputs and
+outputs, each once, as if caches held all that is read again.
+"""
+
+from math import log2
+
+import numpy as np
+
+from kernels.programs import ORDER
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.evaluation.speed.machine import Precision, Work
+from pipeline.evaluation.speed.setting import Setting
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar.table import PolarTable
+
+_SPLINE_TAPS = 12
+
+
+def taps(built: Stack) -> int:
+    """Coefficients under the window."""
+    return (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
+
+
+def stack(field: HeightField, built: Stack) -> Work:
+    """A transform of a real field for every term: along x for every row, along y for the columns kept."""
+    ny, nx = field.shape
+    columns = built.coefficients.shape[1] - built.column_zero
+    flops = built.terms * (2.5 * ny * nx * log2(nx) + 5.0 * columns * ny * log2(ny))
+    precision: Precision = "single" if built.coefficients.itemsize == 4 else "double"
+    return Work("stack", precision, flops, field.heights_um.nbytes + _nbytes(built))
+
+
+def _nbytes(built: Stack) -> float:
+    """Bytes of the coefficients that are terms of the series."""
+    return float(built.coefficients.nbytes * built.terms / built.coefficients.shape[3])
+
+
+def spectrum(setting: Setting, built: Stack, made: PolarSpectrum) -> Work:
+    """polar_spectrum: the window over every term, then the series at every node in s, for half of the azimuths."""
+    pairs = _pairs_in_band(made)
+    flops = 2.0 * pairs * built.terms * 2 * (taps(built) + setting.plan.s_nodes)
+    return Work("spectrum", "single", flops, _nbytes(built) + made.values.nbytes)
+
+
+def _pairs_in_band(made: PolarSpectrum) -> int:
+    """Radii and azimuths of half a turn within the scan's band."""
+    phi = made.azimuths.angles()[: made.azimuths.count // 2]
+    fx, fy = (np.abs(np.outer(made.radius_per_um, along)) for along in (np.cos(phi), np.sin(phi)))
+    return int(np.count_nonzero((fx <= made.band_per_um[0]) & (fy <= made.band_per_um[1])))
+
+
+def build_operator(setting: Setting) -> Work:
+    """At every point: cardinal functions at the nodes of w, the radii about it; wavelengths over the points."""
+    s, w = setting.plan.s_nodes, setting.plan.w_terms
+    points, between, taken = _points(setting)
+    wavelengths = float(np.sum(setting.rules.count))
+    flops = 2.0 * (points * s * s * w + between * ORDER + wavelengths * ORDER * 3 * w)
+    return Work("build_operator", "single", flops, 4.0 * w * (points * s + 3 * taken))
+
+
+def apply_operator(setting: Setting, made: PolarSpectrum, table: PolarTable) -> Work:
+    """At every point: E over r where it lies between radii, then over s; every ring's X, Y, Z; w's series at last."""
+    s, w = setting.plan.s_nodes, setting.plan.w_terms
+    points, between, taken = _points(setting)
+    each = between * ORDER * s + points * s * w + taken * 3 * w + setting.plan.rings.count * 3 * w * w
+    moved = made.values.nbytes + 4.0 * w * (points * s + 3 * taken) + table.values.nbytes
+    return Work("apply_operator", "single", 2.0 * each * setting.plan.azimuths.count, moved)
+
+
+def _points(setting: Setting) -> tuple[float, float, float]:
+    """Points of all groups of rings, those of them between radii, and what all rings together take of them."""
+    points, taken = setting.points, 0
+    low, high = (points.stretch * kappa for kappa in setting.rules.kappa_ends_per_um)
+    lines = np.split(points.kappa_per_um, points.first[1:])
+    for ring, group in enumerate(points.group):
+        line = lines[group]
+        within = int(np.count_nonzero((line >= low[ring]) & (line <= high[ring])))
+        taken += within if points.on_nodes[group] else min(within + ORDER, len(line))
+    return float(len(points.place)), float(points.count[~points.on_radii].sum()), float(taken)
+
+
+def splines(table: PolarTable) -> Work:
+    """A symmetric filter of 12 taps on either side around the turn, then one across the rings."""
+    flops = 2.0 * table.values.size * (3 * _SPLINE_TAPS + 1)
+    return Work("splines", "single", flops, 4.0 * table.values.nbytes)
+
+
+def paper_table(pairs: float, built: Stack) -> Work:
+    """taylor_table: multiplications and additions of eq. 8, 11 and 12 of [D14], for half of (node, wavelength) pairs.
+
+    Its bytes are the stack's; beside its arithmetic nothing of them counts.
+    """
+    terms = built.terms
+    per_pair = taps(built) * 2 * terms + 2 * terms * terms + 3 * (2 * terms - 1)
+    return Work("paper table", "double", 2.0 * 0.5 * pairs * per_pair, built.coefficients.nbytes)

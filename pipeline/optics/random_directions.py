@@ -1,0 +1,24 @@
+"""Random pairs of light and view: what errors are stated over."""
+
+import numpy as np
+
+from pipeline.config.models import Scene
+from pipeline.optics import geometry
+from pipeline.optics.geometry import Array
+
+# the rim itself is left out: cos -> 0 there
+_WIDEST_DEG = 88.0
+
+
+def random_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Array]:
+    """Pairs of directions (count, 3) uniform over the projected hemisphere, or over the scene's lights and views."""
+    rng = np.random.default_rng(seed)
+    theta_max = 90.0 if scene is None else scene.views.theta_max_deg
+    widest = np.sin(np.radians(min(theta_max, _WIDEST_DEG)))
+    wr = geometry.direction(np.arcsin(widest * np.sqrt(rng.random(count))), 2 * np.pi * rng.random(count))
+    if scene is None:
+        wi = geometry.direction(np.arcsin(widest * np.sqrt(rng.random(count))), 2 * np.pi * rng.random(count))
+    else:
+        lights = [geometry.direction(*np.radians([s.theta_deg, s.phi_deg])) for s in scene.lights]
+        wi = np.array(lights)[rng.integers(len(lights), size=count)]
+    return wi, wr

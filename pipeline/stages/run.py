@@ -1,0 +1,181 @@
+"""The order of stages: what a config needs (the plan, a pure function) and doing it."""
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from pipeline.config.models import Config, PolarLayout
+from pipeline.diffraction.device import require_device
+from pipeline.progress import Progress, silent
+from pipeline.stages import provenance, table, validate
+from pipeline.stages.render import RENDER
+from pipeline.stages.spectrum import SPECTRUM
+from pipeline.stages.stack import STACK
+from pipeline.stages.stage import Stage
+from pipeline.stages.surface import SURFACE
+from pipeline.store.store import Artifact, Store
+
+UNCHANGED = "nothing it reads has changed"
+_ON_DEVICE = {"spectrum", "table", "render", "validate"}
+
+
+def stages(config: Config) -> tuple[Stage, ...]:
+    """Every stage of a config, in order: a table of either layout is made of its own spectrum of the surface."""
+    before = SPECTRUM if isinstance(config.table, PolarLayout) else STACK
+    return (SURFACE, before, table.stage_of(config), RENDER, validate.stage_of(config))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage of a plan: its address, and whether it stands in the store."""
+
+    stage: Stage
+    key: str
+    cached: bool
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why a step is cached or to do, and its cost, in words."""
+
+    reason: str
+    cost: str
+
+
+def plan(config: Config, store: Store, until: str = "validate") -> list[Step]:
+    """The steps up to and including stage `until`, each cached or to do. Writes nothing."""
+    keys: dict[str, str] = {}
+    needed = _needed(config, until)
+    for stage in needed:
+        keys[stage.name] = stage.key(config, keys)
+    return [Step(stage, keys[stage.name], store.has(stage.name, keys[stage.name])) for stage in needed]
+
+
+def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
+    """What is to be said of each step of a plan; reads the records of the whole store."""
+    earlier = store.artifacts()
+    made = {step.stage.name for step in steps if not step.cached}
+    told = []
+    for step in steps:
+        last = _latest(earlier, step.stage.name, config.name)
+        reason = UNCHANGED if step.cached else _reason(step.stage, config, made, last)
+        told.append(Explanation(reason, _cost(step.stage, config, last)))
+    return told
+
+
+def _needed(config: Config, until: str) -> list[Stage]:
+    """The stages that `until` needs, in order, itself last."""
+    by_name = {stage.name: stage for stage in stages(config)}
+    wanted, queue = {until}, [until]
+    while queue:
+        for name in by_name[queue.pop()].inputs:
+            if name not in wanted:
+                wanted.add(name)
+                queue.append(name)
+    return [stage for stage in stages(config) if stage.name in wanted]
+
+
+def execute(
+    config: Config,
+    steps: list[Step],
+    store: Store,
+    progress: Progress = silent,
+    on_step: Callable[[Step, float | None], None] | None = None,
+) -> dict[str, Artifact]:
+    """Makes what a plan says is to do; gives every step's artifact, its record checked but not its files.
+
+    `on_step` hears of each step: the seconds it took, None where it was cached.
+    """
+    keys = {step.stage.name: step.key for step in steps}
+    if any(step.stage.name in _ON_DEVICE and not step.cached for step in steps):
+        # better now than after the minutes before the first kernel; drivers answer as slowly as zarr is imported
+        with ThreadPoolExecutor(1) as beside:
+            answer = beside.submit(require_device)
+            import_module("zarr")
+            answer.result()
+    opened: dict[str, Artifact] = {}
+    for step in steps:
+        name, seconds = step.stage.name, None
+        if store.has(name, step.key):
+            store.touch(name, step.key)
+        else:
+            with store.lock(name, step.key):
+                # another run may have made it while we waited
+                if not store.has(name, step.key):
+                    started = time.perf_counter()
+                    for needed in set(step.stage.inputs) - set(opened):
+                        opened[needed] = store.open(needed, keys[needed])
+                    _make(config, step, {needed: opened[needed] for needed in step.stage.inputs}, store, progress)
+                    # its files were hashed as they were written
+                    opened[name] = store.describe(name, step.key)
+                    seconds = time.perf_counter() - started
+        if on_step is not None:
+            on_step(step, seconds)
+    return {name: store.describe(name, key) for name, key in keys.items()}
+
+
+def _make(config: Config, step: Step, inputs: Mapping[str, Artifact], store: Store, progress: Progress) -> None:
+    stage = step.stage
+    record: dict[str, Any] = {
+        "name": config.name,
+        "version": stage.version,
+        "parameters": stage.parameters(config),
+        "inputs": {name: artifact.key for name, artifact in inputs.items()},
+    }
+    with store.create(stage.name, step.key, record) as (folder, whole):
+        started = time.perf_counter()
+        whole["summary"] = stage.produce(config, inputs, folder, progress)
+        whole["provenance"] = {
+            **provenance.versions(),
+            **(provenance.device() if stage.name in _ON_DEVICE else {}),
+            "seconds": round(time.perf_counter() - started, 3),
+        }
+
+
+def _latest(artifacts: list[Artifact], stage: str, name: str) -> Artifact | None:
+    """The artifact of a stage last made or used for a config of this name."""
+    found = [a for a in artifacts if a.stage == stage and a.record.get("name") == name]
+    return max(found, key=lambda a: (a.folder / "artifact.json").stat().st_mtime, default=None)
+
+
+def _reason(stage: Stage, config: Config, made: set[str], last: Artifact | None) -> str:
+    """Why a step is to do: never made, its settings changed, or its inputs will be made."""
+    inputs = sorted(made & set(stage.inputs))
+    if last is None:
+        return "not made before"
+    if last.record["version"] != stage.version:
+        return f"the stage's version is now {stage.version}"
+    changed = _changes(last.record["parameters"], stage.parameters(config))
+    if changed:
+        return f"changed: {', '.join(changed[:3])}" + (f" and {len(changed) - 3} more" if len(changed) > 3 else "")
+    if inputs:
+        return f"its input will be made: {', '.join(inputs)}"
+    return "its input is another one than last time"
+
+
+def _changes(before: Any, now: Any, path: str = "") -> list[str]:
+    """Key paths whose values differ, with both values where they are short."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        keys = sorted(before.keys() | now.keys())
+        return [c for k in keys for c in _changes(before.get(k), now.get(k), f"{path}.{k}" if path else k)]
+    if before == now:
+        return []
+    values = f" {before} -> {now}"
+    return [path + (values if len(values) < 40 else "")]
+
+
+def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
+    """The work in the stage's own units, and how long it took the last time."""
+    texts = {
+        "spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
+        "table": table.size_of(config),
+        "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
+        "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",
+    }
+    parts = [texts[stage.name]] if stage.name in texts else []
+    if last is not None:
+        parts.append(f"{last.record['provenance']['seconds']:.1f} s last time")
+    return ", ".join(parts) or "unknown before it has run once"

@@ -1,0 +1,1 @@
+"""The choice of a polar table's grid, terms and nodes for an error budget."""

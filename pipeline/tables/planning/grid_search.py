@@ -1,0 +1,172 @@
+"""The smallest polar grid that keeps a budget, by measuring.
+
+Three tables beside probes between their texels tell how the error falls with rings and with azimuths,
+e^2 = a / rings^4 + b / azimuths^4 + c, and their product is made smallest.
+"""
+
+from functools import cached_property
+from math import asinh, ceil, sqrt
+
+import numpy as np
+
+from pipeline.config.models import PolarLayout, Scene
+from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.errors import AccuracyError
+from pipeline.optics.coherence import sigma_f
+from pipeline.tables.planning.anisotropy import anisotropy
+from pipeline.tables.planning.candidate import Ingredients
+from pipeline.tables.planning.probes import Probes
+
+_GRID_SHARE = 0.65  # of the budget, by rings and azimuths as the probes see it
+_MOST_BYTES = 3 * 2**30
+# a start for the search: the grid that keeps 0.1 on snake scans at sigma = 16.25 um
+_BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0253, 0.12
+_LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
+_ROUNDS = 6
+_GROWTH = 1.5
+_NEAR = 0.75  # of the target: near enough not to search on
+
+
+class GridSearch:
+    """The search over one surface's grids. What a layout sets stays as it is set."""
+
+    def __init__(
+        self,
+        of: Ingredients,
+        layout: PolarLayout,
+        scene: Scene | None,
+        rho_max: float,
+        delta_e: float,
+        exposure_ru: float,
+    ) -> None:
+        self._of, self._layout, self._scene = of, layout, scene
+        self._rho_max, self._delta_e, self._exposure_ru = rho_max, delta_e, exposure_ru
+        self._stretch, self._axis = anisotropy(of.stack)
+        self._made: PolarSpectrum | None = None
+
+    def run(self) -> tuple[PolarSpectrum, Rings, float | None]:
+        """E on the azimuths chosen, the rings, and the mean error at the probes, None where nothing was searched.
+
+        Raises AccuracyError where E would not fit into memory.
+        """
+        rings, azimuths = self._start()
+        # what does not fit is refused before anything is measured
+        self._spectrum(azimuths)
+        error = None
+        if "auto" in (self._layout.rings, self._layout.azimuths):
+            rings, azimuths, error = self._smallest(rings, azimuths)
+        return self._spectrum(azimuths), self._rings(rings), error
+
+    def _start(self) -> tuple[int, int]:
+        """Rings and azimuths to begin with: both follow the window, and the error falls with their square."""
+        finer = sqrt(_BASE_DELTA_E / self._delta_e)
+        window = self._of.stack.sigma_um / _BASE_SIGMA_UM
+        x = asinh(self._rho_max / self._r0)
+        step = (
+            0.5 * x / (self._of.radius_per_um[-1] * 2.0 * np.pi * self._of.stack.sigma_um)
+            if self._of.is_line
+            else _BASE_RING_STEP
+        )
+        rings = int(np.clip(x / step * finer, self._least_rings, _MOST_RINGS))
+        azimuths = int(np.clip(_BASE_AZIMUTHS * window * finer, _LEAST_AZIMUTHS, _MOST_AZIMUTHS))
+        layout = self._layout
+        return (
+            rings if layout.rings == "auto" else layout.rings,
+            _whole_tiles(azimuths) if layout.azimuths == "auto" else layout.azimuths,
+        )
+
+    @property
+    def _r0(self) -> float:
+        """Rings are even where the specular lobe's width rules; under a laser line, everywhere."""
+        widest = 4.0 * self._rho_max
+        return widest if self._of.is_line else min(_BASE_R0 * _BASE_SIGMA_UM / self._of.stack.sigma_um, widest)
+
+    @property
+    def _least_rings(self) -> int:
+        """So many that the specular lobe is seen, which random probes hardly meet: its own width apart there."""
+        lobe = 1e-3 * self._of.lambda_min_nm * sigma_f(self._of.stack.sigma_um)
+        return max(_LEAST_RINGS, ceil(self._r0 * asinh(self._rho_max / self._r0) / lobe))
+
+    def _rings(self, count: int) -> Rings:
+        return Rings(count, self._r0, self._rho_max)
+
+    def _spectrum(self, azimuths: int) -> PolarSpectrum:
+        """E on so many azimuths: the last one is kept, for the search varies rings in between."""
+        if self._made is None or self._made.azimuths.count != azimuths:
+            need = 4 * azimuths * self._of.s_nodes * len(self._of.radius_per_um)
+            if need > _MOST_BYTES:
+                raise AccuracyError(
+                    f"the power spectrum on {azimuths} azimuths and {self._of.s_nodes} nodes in s needs "
+                    f"{need / 2**30:.1f} GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller "
+                    "coherence.sigma_um, lower the heights or raise accuracy.delta_e."
+                )
+            # its memory may serve the next one
+            self._made = None
+            self._made = self._of.spectrum(Azimuths(azimuths, self._stretch, self._axis))
+        return self._made
+
+    def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
+        """Rings and azimuths whose error is within the budget at the least product, as far as a model tells."""
+        target = _GRID_SHARE * self._delta_e
+        errors = {}
+
+        def error(r: int, a: int) -> float:
+            if (r, a) not in errors:
+                errors[r, a] = self._error(r, a)
+            return errors[r, a]
+
+        # e^2 = (rings' share) / rings^4 + (azimuths' share) / azimuths^4 + the rest, from three tables
+        here = error(rings, azimuths) ** 2
+        other_rings = _other(rings, 3 * rings // 4)
+        other_azimuths = _other(azimuths, _whole_tiles(3 * azimuths // 4))
+        by_rings = _share(error(other_rings, azimuths) ** 2 - here, other_rings, rings)
+        by_azimuths = _share(error(rings, other_azimuths) ** 2 - here, other_azimuths, azimuths)
+        rest = max(here - by_rings * rings**-4.0 - by_azimuths * azimuths**-4.0, 0.0)
+        left = max(target**2 - rest, 0.25 * target**2)
+        best = rings, azimuths
+        for _ in range(_ROUNDS):
+            before, best = best, self._clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25)
+            if errors.get(best, 0.0) > target:
+                # the model has nothing more to ask for, and errs: a coarse grid may be better by luck
+                best = self._clipped(_GROWTH * before[0], _GROWTH * before[1])
+            if _NEAR * target <= error(*best) <= target:
+                break
+            left *= min(4.0, (0.9 * target / error(*best)) ** 2)
+        # what a config sets was varied to measure, not to choose
+        allowed = {pair: errors[pair] for pair in errors if pair == self._clipped(*pair)}
+        met = [pair for pair in allowed if allowed[pair] <= target]
+        best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(allowed, key=allowed.__getitem__)
+        return *best, allowed[best]
+
+    def _clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
+        layout = self._layout
+        return (
+            int(np.clip(ceil(rings), self._least_rings, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
+            _whole_tiles(int(np.clip(azimuths, _LEAST_AZIMUTHS, _MOST_AZIMUTHS)))
+            if layout.azimuths == "auto"
+            else layout.azimuths,
+        )
+
+    @cached_property
+    def _probes(self) -> Probes:
+        return Probes(self._of, self._scene, self._rho_max, self._exposure_ru)
+
+    def _error(self, rings: int, azimuths: int) -> float:
+        """Mean CIELAB error at the probes of a table of this size."""
+        return self._probes.error(self._of.table(self._spectrum(azimuths), self._rings(rings)))
+
+
+def _other(count: int, coarser: int) -> int:
+    """A second count to measure at: the coarser one, or the double where that is none."""
+    return coarser if coarser < count else 2 * count
+
+
+def _share(growth: float, other: int, here: int) -> float:
+    """c of an error c / n^4 that grows by `growth` from `here` to `other`."""
+    return float(max(growth / (other**-4.0 - here**-4.0), 0.0))
+
+
+def _whole_tiles(azimuths: int) -> int:
+    """Tiles that are whole for every fourth azimuth too, so coarser grids need no other gather."""
+    return 4 * TILE * ceil(azimuths / (4 * TILE))

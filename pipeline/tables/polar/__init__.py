@@ -1,0 +1,1 @@
+"""The polar table: quadrature, spectral integral, splines, compression."""

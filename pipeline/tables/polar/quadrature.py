@@ -1,0 +1,118 @@
+"""Wavelengths of the spectral integral, chosen ring by ring from an estimate of the error they leave.
+
+|P|^2 along a ray is a Fourier integral over the coherence window's autocorrelation, exp(-x^2 / (4 sigma^2)). At a
+ring rho a rule with weights q_l answers each of its waves with D(x rho) = sum_l q_l exp(2 pi i x rho / lambda_l). In
+speckle all x within the window carry independent amplitudes, so the relative error of the integral is the root
+mean square of D's error over the window. Large rings need fine steps, rings near the mirror direction few.
+"""
+
+from collections.abc import Callable
+from math import ceil, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.spectral_operator import RingQuadratures as RingQuadratures
+from pipeline.config.models import FINE_STEP_NM
+from pipeline.errors import AccuracyError
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature
+
+_STEPS_NM = (20.0, 10.0, 5.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
+# the window's autocorrelation squared, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
+_REACH_SIGMAS, _POINTS = 4.0, 48
+_GRID_POINTS = 256
+
+
+def choose(
+    integrand: Callable[[float], Quadrature], rho: Array, sigma_um: float, tolerance: float
+) -> RingQuadratures:
+    """The coarsest rule for every ring whose estimated relative error is below `tolerance`.
+
+    `integrand` gives the quadrature of a step in nm (one wavelength, whatever the step, for a laser line). Every rule
+    is scaled to keep the white that 1 nm gives, of which 20 nm miss a hundredth. Raises AccuracyError where even the
+    finest step would err by more.
+    """
+    white = integrand(FINE_STEP_NM)
+    if len(white.lambda_nm) == 1:
+        return uniform(white, len(rho))
+    steps = (_keeping(white, integrand(step)) for step in _STEPS_NM)
+    coarse = next(steps)
+    x = np.linspace(0.0, _REACH_SIGMAS * sigma_um, _POINTS)
+    share = np.exp(-0.5 * (x / sigma_um) ** 2)
+    share /= share.sum()
+    y = np.linspace(0.0, x[-1] * rho[-1], _points(x[-1] * rho[-1], coarse))
+    chosen, open_, rules = np.full(len(rho), -1), np.arange(len(rho)), [coarse]
+    response = _response(coarse, y)
+    for finer in steps:
+        response_finer = _response(finer, y)
+        error = np.max(np.abs(response - response_finer) ** 2, axis=1)
+        left = np.sqrt(np.interp(np.outer(rho[open_], x), y, error) @ share)
+        chosen[open_[left <= tolerance]] = len(rules) - 1
+        open_ = open_[left > tolerance]
+        if not len(open_):
+            return _assemble(rules, chosen)
+        rules.append(finer)
+        response = response_finer
+    raise AccuracyError(
+        f"the spectrum's lines need wavelengths closer than {_STEPS_NM[-2]} nm for an error of {tolerance:.1g}; "
+        "raise accuracy.delta_e, or narrow spectrum.range_nm"
+    )
+
+
+def _keeping(white: Quadrature, rule: Quadrature) -> Quadrature:
+    """The rule with each channel scaled to the integral that `white` gives it."""
+    found, asked = rule.weights.sum(axis=0), white.weights.sum(axis=0)
+    # a channel that sees nothing keeps nothing
+    scale = np.divide(asked, found, out=np.ones(3), where=found != 0.0)
+    return Quadrature(rule.lambda_nm, rule.weights * scale)
+
+
+def uniform(rule: Quadrature, rings: int) -> RingQuadratures:
+    """The same rule for every ring."""
+    return _assemble([rule], np.zeros(rings, int))
+
+
+def _points(y_max: float, rule: Quadrature) -> int:
+    """Samples of D over [0, y_max] that follow its fastest beat, between the two ends of the spectrum."""
+    beat = 1e3 / rule.lambda_nm[0] - 1e3 / rule.lambda_nm[-1]
+    return max(_GRID_POINTS, int(1.5 * beat * y_max))
+
+
+def _response(rule: Quadrature, y: Array) -> Array:
+    """D(y) of X, Y, Z (len(y), 3), over each channel's integral; `y` in even steps from 0.
+
+    A wave at a sum is the product of waves at its parts, which makes the sum over wavelengths a matrix product.
+    """
+    # three channels multiply the waves within a run
+    run = ceil(sqrt(len(y) / 3.0))
+    starts, within = _waves(rule, y[::run]), _waves(rule, y[:run])
+    # a channel that sees nothing has no error either
+    total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
+    shared = within[:, None] * (rule.weights / total).T.astype(np.float32)
+    found = starts @ shared.reshape(3 * run, -1).T
+    return np.asarray(found.reshape(-1, 3)[: len(y)])
+
+
+def _waves(rule: Quadrature, y: Array) -> NDArray[np.complex64]:
+    """exp(2 pi i y / lambda), (len(y), L)."""
+    turns = np.outer(y, 1e3 / rule.lambda_nm)
+    # whole turns go first: what is left keeps its digits in single precision, whose sine and cosine are much faster
+    turns -= np.rint(turns)
+    phase = (2.0 * np.pi * turns).astype(np.float32)
+    waves = np.empty(phase.shape, np.complex64)
+    waves.real, waves.imag = np.cos(phase), np.sin(phase)
+    return waves
+
+
+def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:
+    used = sorted(set(chosen.tolist()))
+    count = np.array([len(rules[k].lambda_nm) for k in used])
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    place = np.searchsorted(used, chosen)
+    return RingQuadratures(
+        1e-3 * np.concatenate([rules[k].lambda_nm for k in used]),
+        np.concatenate([rules[k].weights for k in used]),
+        first[place],
+        count[place],
+    )

@@ -1,0 +1,89 @@
+"""The polar table: XYZ of |P|^2 on rings and azimuths, Chebyshev polynomials in |w|, cubic splines between texels.
+
+XYZ / (C cos ti) = sum_k T_k(2 |w| / w_max - 1) table[ring, channel, k, azimuth],   w_max = sqrt(4 - rho^2)
+
+where `table` is looked up by bicubic B-splines. On the disc of a ring w reaches no further than w_max, for
+(u, v, w) is the sum of two unit vectors.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import cubic_spline
+from kernels.spectral_operator import RingQuadratures
+from pipeline.diffraction.polar_grid import PolarGrid, Rings
+from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.optics.brdf import grey
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature
+from pipeline.tables.polar import spectral_integral
+from pipeline.tables.polar.spectral_integral import Reflectance
+
+# at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
+_LEAST_W2 = 1e-9
+
+
+@dataclass(frozen=True)
+class PolarTable:
+    """B-spline coefficients on a polar grid.
+
+    values: float32 (rings, 3, w terms, azimuths): X, Y, Z; Chebyshev terms of |w|.
+    """
+
+    values: NDArray[np.float32]
+    grid: PolarGrid
+
+    @property
+    def w_terms(self) -> int:
+        return int(self.values.shape[2])
+
+
+def build(
+    spectrum: PolarSpectrum,
+    rings: Rings,
+    quadratures: RingQuadratures,
+    w_terms: int,
+    reflectance: Reflectance = grey,
+) -> PolarTable:
+    """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
+    rho = rings.rho()
+    of = spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um
+    samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
+    values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
+    return PolarTable(values, PolarGrid(rings, spectrum.azimuths))
+
+
+def w_position(rho: Array, w: Array) -> Array:
+    """x = 2 |w| / w_max - 1 in [-1, 1]."""
+    w_max = np.sqrt(np.maximum(4.0 - rho**2, _LEAST_W2))
+    return np.asarray(np.clip(2.0 * np.abs(w) / w_max - 1.0, -1.0, 1.0))
+
+
+def look_up(table: PolarTable, uvw: Array) -> Array:
+    """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the grid's rings."""
+    rings, azimuths = table.grid.rings, table.grid.azimuths
+    rho = np.hypot(uvw[:, 0], uvw[:, 1])
+    ring = rings.index(rho)
+    # rounding may carry a direction of the rim itself past the last ring
+    inside = ring <= rings.count - 1 + 1e-6
+    place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
+    flat = table.values.reshape(rings.count, -1, azimuths.count)
+    found = cubic_spline.look_up(flat, *place).astype(np.float64)
+    found[~inside] = np.nan
+    return found
+
+
+def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quadrature) -> float:
+    """Share of the light (Y weights), over the grid's disc, whose frequencies lie beyond the scan's band."""
+    rho, phi = grid.rings.rho(), grid.azimuths.angles()
+    area = np.outer(rho * np.gradient(rho), np.abs(np.gradient(np.unwrap(phi))))
+    # along each direction the band ends at r = reach, so all wavelengths shorter than rho / reach are lost
+    reach = np.minimum(
+        band_per_um[0] / np.maximum(np.abs(np.cos(phi)), 1e-12),
+        band_per_um[1] / np.maximum(np.abs(np.sin(phi)), 1e-12),
+    )
+    shorter = np.concatenate([[0.0], np.cumsum(np.abs(light.weights[:, 1]))])
+    lost = np.searchsorted(light.lambda_nm, 1e3 * rho[:, None] / reach, side="left")
+    return float(np.sum(area * shorter[lost] / shorter[-1]) / np.sum(area))

@@ -1,0 +1,1 @@
+"""The paper's table: grid and I_p(u, v)."""

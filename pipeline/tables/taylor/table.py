@@ -1,0 +1,176 @@
+"""The paper's tables: I_p(u, v), p = 0 .. 2N, in X, Y and Z ([D14] eq. 8-12)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import diffraction
+from pipeline.config.models import Scene
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.upload import upload
+from pipeline.errors import AccuracyError
+from pipeline.optics import geometry
+from pipeline.optics.geometry import Array
+from pipeline.optics.spectra import Quadrature
+from pipeline.progress import Progress, silent
+from pipeline.tables.taylor import grid
+
+_MOST_BYTES = 4 * 2**30
+
+
+@dataclass(frozen=True)
+class TaylorTable:
+    """I_p on the grid of pipeline.tables.taylor.grid.
+
+    values: float32 (v, u, channel, p): I_p of X, Y, Z, dimensionless; 0 at nodes not computed.
+    computed: bool (v, u); a node is skipped where no direction, or none of the scene, reaches its cells.
+    unknown: float32 (v, u): share of the light (Y weights) whose frequencies lie beyond the scan's band.
+    power: the grid's exponent a.
+    """
+
+    values: NDArray[np.float32]
+    computed: NDArray[np.bool_]
+    unknown: NDArray[np.float32]
+    power: float
+
+    @property
+    def resolution(self) -> int:
+        return int(self.values.shape[0])
+
+    @property
+    def unknown_share(self) -> float:
+        """Share of the (u, v) disc's area, weighted as light, of which the scan knows nothing."""
+        u = grid.nodes(self.resolution, self.power)
+        width = np.gradient(u)
+        inside = np.hypot(u[:, None], u) <= grid.U_MAX
+        area = np.outer(width, width) * (inside & self.computed)
+        return float(np.sum(area * self.unknown) / max(np.sum(area), np.finfo(float).tiny))
+
+
+def build(
+    stack: Stack,
+    quadrature: Quadrature,
+    resolution: int,
+    power: float,
+    scene: Scene | None = None,
+    progress: Progress = silent,
+) -> TaylorTable:
+    """Tables of a Taylor stack under the light and observer of `quadrature` (weights as the integral has them).
+
+    Only one half plane is computed: heights are real, so I_p(-u, -v) = (-1)^p I_p(u, v). Memory is that of the table
+    and one tile. Raises AccuracyError where the table would not fit.
+    """
+    _check_memory(resolution, 2 * stack.terms - 1)
+    u = grid.nodes(resolution, power)
+    computed = _reachable_nodes(u, scene)
+    half_plane = (u > 0.0) | ((u == 0.0) & (u[:, None] >= 0.0))
+    v_index, u_index = np.nonzero((computed | computed[::-1, ::-1]) & half_plane)
+    nodes = np.stack([u[u_index], u[v_index]], axis=-1)
+    # a border node may stand a little outside the disc of radius 2, where the stack ends
+    radius = np.maximum(np.hypot(nodes[:, 0], nodes[:, 1]) / grid.U_MAX, 1.0)
+    powers = 2 * stack.terms - 1
+    values = np.zeros((resolution, resolution, 3, powers), dtype=np.float32)
+    sign = np.where(np.arange(powers) % 2 == 0, 1.0, -1.0)
+    for tile, i_p in _tiles(stack, quadrature, nodes / radius[:, None]):
+        rows, columns = v_index[tile], u_index[tile]
+        values[resolution - 1 - rows, resolution - 1 - columns] = sign * i_p
+        values[rows, columns] = i_p
+        progress("table", tile.stop / len(nodes))
+    values[~computed] = 0.0
+    return TaylorTable(values, computed, _unknown(stack, quadrature, u), power)
+
+
+def node_values(stack: Stack, quadrature: Quadrature, uv: Array) -> Array:
+    """I_p (nodes, 3, 2 N + 1) in float64 at any (u, v) with u >= 0 and |(u, v)| <= 2."""
+    return np.concatenate([i_p.copy() for _, i_p in _tiles(stack, quadrature, uv)])
+
+
+def _tiles(stack: Stack, quadrature: Quadrature, uv: Array) -> Iterator[tuple[slice, Array]]:
+    return diffraction.taylor_table(upload(stack), uv, 1e-3 * quadrature.lambda_nm, quadrature.weights)
+
+
+def sum_powers(i_p: Array, w: Array) -> Array:
+    """sum_p w^p I_p ([D14] eq. 10): (..., 3, P) and (...,) -> (..., 3), by Horner's rule in float64."""
+    total = np.zeros(i_p.shape[:-1])
+    for p in range(i_p.shape[-1] - 1, -1, -1):
+        total = total * w[..., None] + i_p[..., p]
+    return total
+
+
+def at_directions(stack: Stack, quadrature: Quadrature, uvw: Array) -> Array:
+    """sum_p w^p I_p (directions, 3) in float64 at `uvw` (directions, 3) themselves, without a grid between."""
+    # I_p(-u, -v) = (-1)^p I_p(u, v): half of (u, v) is enough where w takes the turn's sign
+    turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
+    return sum_powers(node_values(stack, quadrature, turn[:, None] * uvw[:, :2]), turn * uvw[:, 2])
+
+
+def look_up(table: TaylorTable, uvw: Array) -> Array:
+    """sum_p w^p I_p (directions, 3) at `uvw` (directions, 3), bilinear between nodes.
+
+    NaN where a neighbour was not computed: the scene the table was made for does not reach there.
+    """
+    n = table.resolution
+    column, row = (grid.node_index(uvw[:, axis], n, table.power) for axis in (0, 1))
+    left, bottom = (np.clip(np.floor(index).astype(int), 0, n - 2) for index in (column, row))
+    a, b = column - left, row - bottom
+    total = np.zeros((len(uvw), 3))
+    for down, right, weight in (
+        (0, 0, (1 - a) * (1 - b)),
+        (0, 1, a * (1 - b)),
+        (1, 0, (1 - a) * b),
+        (1, 1, a * b),
+    ):
+        at = bottom + down, left + right
+        corner = sum_powers(table.values[at], uvw[:, 2])
+        known = table.computed[at] | (weight == 0.0)
+        total += np.where(known, weight, np.nan)[:, None] * corner
+    return total
+
+
+def _check_memory(resolution: int, powers: int) -> None:
+    need = 4 * resolution**2 * 3 * powers
+    if need > _MOST_BYTES:
+        raise AccuracyError(
+            f"{powers} tables of {resolution} x {resolution} nodes need {need / 2**30:.1f} GiB, more than the "
+            f"{_MOST_BYTES / 2**30:.0f} GiB allowed. Lower table.resolution or raise table.tolerance (fewer terms)."
+        )
+
+
+def _reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
+    """Nodes at the corners of grid cells that some pair of directions reaches, (v, u).
+
+    All of (u, v) lies in the disc of radius 2; a fixed light on a flat sample reaches only the disc of
+    radius sin(theta_max) about -wi.
+    """
+    if scene is None:
+        discs = [((0.0, 0.0), grid.U_MAX)]
+    else:
+        reach = float(np.sin(np.radians(scene.views.theta_max_deg)))
+        centres = (-geometry.direction(np.radians(s.theta_deg), np.radians(s.phi_deg)) for s in scene.lights)
+        discs = [((float(c[0]), float(c[1])), reach) for c in centres]
+    nodes = np.zeros((len(u), len(u)), dtype=bool)
+    low, high = u[:-1], u[1:]
+    for (cx, cy), radius in discs:
+        # nearest point of each cell to the disc's centre
+        dx, dy = np.clip(cx, low, high) - cx, np.clip(cy, low, high) - cy
+        cells = np.hypot(dx[None, :], dy[:, None]) <= radius
+        for rows, columns in (
+            (np.s_[:-1], np.s_[:-1]),
+            (np.s_[:-1], np.s_[1:]),
+            (np.s_[1:], np.s_[:-1]),
+            (np.s_[1:], np.s_[1:]),
+        ):
+            nodes[rows, columns] |= cells
+    return nodes
+
+
+def _unknown(stack: Stack, quadrature: Quadrature, u: Array) -> NDArray[np.float32]:
+    """Share of the Y weight at each node whose frequency lies beyond the scan's band, (v, u)."""
+    band_x, band_y = stack.band_per_um
+    # the weight of all wavelengths shorter than |u| / band is lost
+    shorter = np.concatenate([[0.0], np.cumsum(np.abs(quadrature.weights[:, 1]))])
+    shorter /= shorter[-1]
+    lost = [np.searchsorted(quadrature.lambda_nm, 1e3 * np.abs(u) / band, side="left") for band in (band_x, band_y)]
+    return shorter[np.maximum(lost[0][None, :], lost[1][:, None])].astype(np.float32)

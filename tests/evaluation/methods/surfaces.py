@@ -1,0 +1,21 @@
+"""Configs of recipes, their heights, and a patch of Elaphe four sigma wide."""
+
+from pipeline.config.models import Config
+from pipeline.surface import recipes
+from pipeline.surface.heightfield import HeightField
+
+SIGMA = 6.5
+
+
+def config(recipe: dict[str, object], sigma: float = SIGMA, **sections: object) -> Config:
+    return Config.model_validate(
+        {"name": "t", "surface": {"recipe": recipe}, "coherence": {"sigma_um": sigma}, **sections}
+    )
+
+
+def made(of: Config) -> HeightField:
+    assert of.surface.recipe is not None
+    return recipes.make(of.surface.recipe)
+
+
+ELAPHE = config({"kind": "elaphe", "size_um": 4 * SIGMA, "pitch_um": 0.1})

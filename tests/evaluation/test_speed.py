@@ -1,0 +1,213 @@
+"""The bench's other ways to the same numbers, its counts of work, and its verdicts."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from kernels import device
+from pipeline.accuracy.checks import relative_error
+from pipeline.config.models import Coherence, Config, Material, Mirror, PolarLayout, Spectrum, Surface
+from pipeline.evaluation.speed import machine, memory, nufft, plain, polar_bake, setting, transforms, work
+from pipeline.evaluation.speed.criteria import Criterion
+from pipeline.evaluation.speed.machine import Machine, Timed, Work
+from pipeline.evaluation.speed.polar_bake import Stages
+from pipeline.evaluation.speed.setting import Setting
+from pipeline.evaluation.speed.timing import best_of
+from pipeline.evaluation.speed.truth import MapTruth
+from pipeline.surface.heightfield import HeightField
+
+pytestmark = pytest.mark.slow
+
+SIGMA_UM = 2.0
+
+
+def config(**sections: object) -> Config:
+    base = {"coherence": Coherence(sigma_um=SIGMA_UM), "spectrum": Spectrum(range_nm=(520.0, 560.0))}
+    return Config(name="small", surface=Surface(recipe=Mirror(kind="mirror")), **{**base, **sections})
+
+
+def rough(pitch_um: tuple[float, float] = (0.1, 0.11), rows: int = 64) -> HeightField:
+    rng = np.random.default_rng(4)
+    return HeightField(rng.uniform(-0.08, 0.08, (rows, 80)), pitch_um)
+
+
+CASES = {
+    "plain": (rough(), config()),
+    # |f| beyond 1 / (2 pitch) is unknown and dark
+    "coarse scan": (rough((0.2, 0.19)), config()),
+    "patch wider than the window": (rough(rows=32), config(coherence=Coherence(sigma_um=0.8))),
+    "gold": (rough(), config(material=Material(fresnel="conductor"))),
+}
+
+
+@pytest.fixture(params=CASES)
+def case(request: pytest.FixtureRequest) -> Setting:
+    field, chosen = CASES[request.param]
+    return setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
+
+
+def test_plain_numpy_gives_the_samples(case: Setting) -> None:
+    """One texel after the other, from the same stack: what is left is E's interpolation."""
+    built = case.stack()
+    samples = case.samples(case.spectrum(built))
+    coefficients = plain.complex_coefficients(built)
+    rho, phi = case.plan.rings.rho(), case.plan.azimuths.angles()
+    for ring, azimuth in ((0, 5), (7, 40), (15, 90), (23, 61)):
+        uv = rho[ring] * np.array([np.cos(phi[azimuth]), np.sin(phi[azimuth])])
+        found = plain.polar_texel(built, coefficients, case.rule_of_ring(ring), uv, case.series(ring))
+        error = relative_error(samples[ring, :, :, azimuth], found, 1e-4 * samples.max())
+        assert error.median < 1e-3
+        assert error.maximum < 0.05
+
+
+def test_nufft_gives_the_samples(case: Setting) -> None:
+    pytest.importorskip("finufft")
+    samples = case.samples(case.spectrum(case.stack()))
+    routed = nufft.run(case, 48, 1)
+    # all of half a turn; the other half follows, for heights are real
+    error = relative_error(routed.samples.astype(float), samples, 1e-4 * samples.max())
+    assert error.median < 1e-3
+    # E steps to 0 where the band ends, and its interpolation rounds the step off
+    assert error.percentile_99 < 0.05
+    assert nufft.points_of(case) == routed.points
+    assert routed.seconds(case) > routed.fixed_s > 0.0
+
+
+def test_the_stacks_transforms_agree(case: Setting) -> None:
+    """Kernel, FFTW and scipy on the same terms and frequencies, in both precisions."""
+    single, double = transforms.measure(case, 1)
+    assert (single.precision, double.precision) == ("single", "double")
+    assert single.terms == double.terms == case.plan.terms
+    assert 0.0 < max(single.fftw_difference, single.scipy_difference) < 1e-6
+    assert 0.0 < max(double.fftw_difference, double.scipy_difference) < 1e-14
+    assert min(single.kernel_s, single.fftw_s, single.scipy_s) > 0.0
+    built = case.stack()
+    assert transforms.kept_of(built).shape == built.coefficients.shape[:2]
+
+
+def test_of_two_bakes_the_better_times_count() -> None:
+    of = CASES["plain"]
+    baked = polar_bake.bake(setting.make(*of, PolarLayout(rings=24, azimuths=96)), 1)
+    slow = replace(baked, stages=Stages(1.0, 1.0, 1.0), second_light_s=9.0, kernel_s={"a": 1.0, "b": 4.0})
+    fast = replace(baked, stages=Stages(0.1, 2.0, 0.1), second_light_s=None, kernel_s={"a": 3.0, "b": 2.0})
+    for found in (polar_bake.best(slow, fast), polar_bake.best(fast, slow)):
+        assert found.stages.total == pytest.approx(2.2)
+        assert found.second_light_s == 9.0
+        assert found.kernel_s == {"a": 1.0, "b": 2.0}
+
+
+def test_a_bake_is_timed_kernel_by_kernel() -> None:
+    field, chosen = CASES["plain"]
+    made = setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
+    baked = polar_bake.bake(made, 2)
+    assert baked.stages.total > baked.stages.table > baked.kernel_s["apply_operator"] > 0.0
+    assert baked.second_light_s is not None
+    assert [timed.work.stage for timed in polar_bake.stages(made, baked)] == [
+        "stack",
+        "spectrum",
+        "build_operator",
+        "apply_operator",
+        "splines",
+    ]
+
+
+def test_the_spectrum_needs_what_its_loops_do() -> None:
+    """Per radius and azimuth of half a turn: every tap of every term, complex, and every term at every node in s."""
+    field, chosen = CASES["plain"]
+    made = setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
+    built = made.stack()
+    taps = (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
+    per_pair = 2 * (taps * 2 * built.terms + 2 * built.terms * made.plan.s_nodes)
+    found = work.spectrum(made, built, made.spectrum(built))
+    assert found.flops == per_pair * len(made.radius_per_um) * 48
+    assert built.terms <= built.coefficients.shape[3]
+
+
+def test_a_share_is_of_what_binds() -> None:
+    limits = Machine("device", 2, single_flops=100.0, double_flops=50.0, bandwidth=10.0)
+    reached = machine.share(Timed(Work("x", "single", flops=100.0, bytes=5.0), 2.0), limits)
+    assert (reached.peak_share, reached.bandwidth_share) == (0.5, 0.25)
+    assert (reached.bound, reached.bound_share) == ("arithmetic", 0.5)
+    reached = machine.share(Timed(Work("x", "double", flops=10.0, bytes=15.0), 2.0), limits)
+    assert (reached.bound, reached.bound_share) == ("bandwidth", 0.75)
+
+
+@pytest.mark.parametrize(("precision", "lanes", "real"), [("single", 16, np.float32), ("double", 8, np.float64)])
+def test_a_peak_is_the_kernels_operations_over_its_shortest_launch(
+    precision: Literal["single", "double"], lanes: int, real: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Operations are those that the kernel's text spells out, and what it writes shows that it did them."""
+    launched = []
+    launch = device.Program.launch
+
+    def note(self: device.Program, kernel: str, size: tuple[int, ...], steps: np.int32, buffer: object) -> None:
+        launched.append((size[0], int(steps), buffer))
+        launch(self, kernel, size, steps, buffer)
+
+    monkeypatch.setattr(device.Program, "launch", note)
+    with device.timing() as launches:
+        peak = device.measure_peak(precision, 0.1)
+    items, steps, buffer = launched[-1]
+    chains = device.source("peak.cl").count("= fma(")
+    # the first compiles; a listener's own stopwatch stops a little later
+    shortest = min(each.seconds for each in launches[1:])
+    assert peak == pytest.approx(2 * chains * lanes * steps * items / shortest, rel=0.05)
+    # x = 0.999 x + 0.001 n comes to n, in every lane of every chain, and not before some thousand steps
+    found = device.download(buffer, np.empty(items, real))
+    np.testing.assert_allclose(found, chains * lanes * np.arange(items), rtol=1e-3, atol=1e-3)
+
+
+def test_bandwidth_is_three_arrays_over_the_shortest_launch() -> None:
+    """Beside numpy's own copy, which reads one array and writes one: neither is far from what memory allows."""
+    with device.timing() as launches:
+        bandwidth = device.measure_bandwidth(0.3)
+    shortest = min(each.seconds for each in launches[1:])
+    ones = np.ones(round(bandwidth * shortest / 3.0), np.uint8)
+    out = np.empty_like(ones)
+    _, copied_s = best_of(5, lambda: np.copyto(out, ones))
+    assert 0.2 < bandwidth / (2.0 * ones.nbytes / copied_s) < 5.0
+
+
+def test_launches_are_heard_only_while_one_listens() -> None:
+    with device.timing() as outer:
+        with device.timing() as inner:
+            device.measure_peak("single", 0.001)
+        heard = len(inner)
+        device.measure_peak("single", 0.001)
+    assert {launch.kernel for launch in outer} == {"peak"}
+    assert 0 < heard == len(inner) < len(outer)
+
+
+def test_the_map_tells_a_good_table_from_a_bad_one() -> None:
+    field, chosen = CASES["plain"]
+    truth = MapTruth(field, chosen, 41)
+    errors = []
+    for rings, azimuths in ((16, 64), (80, 512)):
+        made = setting.make(field, chosen, PolarLayout(rings=rings, azimuths=azimuths))
+        errors.append(truth.error(made.table(made.spectrum(made.stack()), made.light)).mean)
+    assert errors[1] < 0.3
+    assert errors[0] > 5.0 * errors[1]
+
+
+def test_memory_is_that_of_a_process_of_its_own() -> None:
+    """More than an interpreter with numpy, and not what this process holds."""
+    held = np.ones(2**27)
+    peak = memory.peak_bytes(*CASES["plain"], PolarLayout(rings=24, azimuths=96))
+    assert 2**25 < peak < 2**30 <= held.nbytes
+
+
+@pytest.mark.parametrize(
+    ("measured", "sense", "limit", "verdict"),
+    [
+        (0.08, "<=", 0.08, "pass"),
+        (0.081, "<=", 0.08, "MISS"),
+        (50.0, ">=", 50.0, "pass"),
+        (3.0, "<", 3.0, "MISS"),
+        (None, "<", 3.0, "not measured"),
+        (3.0, "<", None, "told"),
+    ],
+)
+def test_verdicts(measured: float | None, sense: str, limit: float | None, verdict: str) -> None:
+    assert Criterion("x", "1", "y", measured, sense, limit, "").verdict == verdict
