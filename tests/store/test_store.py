@@ -419,7 +419,7 @@ def test_a_limit_on_file_size_is_a_storage_fault(store):
 WRITER = """
 import sys
 from pathlib import Path
-from pipeline.store import Store
+from pipeline.store.store import Store
 store, key = Store(Path(sys.argv[1])), sys.argv[2]
 with store.lock("surface", key), store.create("surface", key, {"name": "a"}) as (folder, _):
     for name in ("0.bin", "1.bin", "2.bin"):
