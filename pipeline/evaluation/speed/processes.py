@@ -36,7 +36,11 @@ class CommandLine:
         with tempfile.TemporaryDirectory() as folder:
             command = [*self.words, "run", str(config), "--store", f"{folder}/store", "--out", f"{folder}/out"]
             command += [] if until is None else ["--until", until]
-            environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
+            environment = dict(os.environ)
+            if cache is not None:
+                environment["XDG_CACHE_HOME"] = str(cache)
+                # this process told PoCL where its own cache is
+                environment.pop("POCL_CACHE_DIR", None)
             with tempfile.TemporaryFile("w+", encoding="utf-8") as told:
                 started = time.perf_counter()
                 process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=told, env=environment)
