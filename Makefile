@@ -7,7 +7,7 @@ BAKE := $(VENV)/bin/diffract-bake
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint clean
+.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint format clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -18,6 +18,7 @@ help:
 	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
 	@echo "make test-avx2               the kernels' tests and two bakes, built for a processor without AVX-512"
 	@echo "make lint                    ruff and mypy alone"
+	@echo "make format                  ruff mends and formats the code"
 	@echo "make setup                   only the set-up"
 	@echo "make clean                   remove the environment and $(OUT)"
 
@@ -73,6 +74,10 @@ lint: $(VENV)/ready
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+format: $(VENV)/ready
+	$(VENV)/bin/ruff check --fix .
+	$(VENV)/bin/ruff format .
 
 test: setup lint
 	$(VENV)/bin/python -m pytest

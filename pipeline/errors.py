@@ -1,7 +1,7 @@
 """What can go wrong, told to a person in one line.
 
 Every message says where the fault is, what was expected, what was found and the way out. Each class
-carries the process exit code that README documents.
+carries the process exit code that docs/usage.md documents.
 """
 
 

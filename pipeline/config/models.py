@@ -1,6 +1,6 @@
 """The TOML that describes one material: its models, its defaults and its faults.
 
-Keys and units are those of the README's reference; an unknown key is a fault. `load` collects every
+Keys and units are those of docs/usage.md; an unknown key is a fault. `load` collects every
 fault of a file before it raises, each with its key path; what ties sections together is looked at once
 each of them is sound.
 """

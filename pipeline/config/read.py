@@ -94,7 +94,7 @@ def _fault(error: Any) -> tuple[str, str]:
     parts = [p for p in path if not (isinstance(p, str) and _is_union_tag(p, path))]
     key = ".".join(str(p) for p in (*parts, *last))
     if unknown:
-        return key, "unknown key (see the README's config reference)"
+        return key, "unknown key (see the config reference in docs/usage.md)"
     if error["type"] == "missing":
         return key, "required, but missing"
     if error["type"] == "model_type":

@@ -38,7 +38,7 @@ _ROWS_AT_ONCE = 32
 def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: float) -> Array:
     """|P|^2 (directions,) = |sum g p exp(+2 pi i f.x) / sum g|^2 at one wavelength, `uvw` (directions, 3).
 
-    f = (u, v) / lambda, p = exp(i k w h) on a patch repeating under the window g (DESIGN's conventions; [D14] eq. 1
+    f = (u, v) / lambda, p = exp(i k w h) on a patch repeating under the window g (docs/conventions.md; [D14] eq. 1
     and 8). NaN beyond the scan's band.
     """
     lambda_um = 1e-3 * lambda_nm
@@ -81,7 +81,7 @@ def xyz_direct(
 def integrate(
     power: Array, quadrature: Quadrature, material: Material, sigma_um: float, wi: Array, wr: Array
 ) -> Array:
-    """XYZ (directions, 3) = C cos(ti) sum_l |P|^2 weights (DESIGN sec. 1) from |P|^2 (directions, L).
+    """XYZ (directions, 3) = C cos(ti) sum_l |P|^2 weights (docs/conventions.md) from |P|^2 (directions, L).
 
     What lies beyond the scan's band (NaN) is unknown and adds nothing. A metal's reflectance is taken at every
     wavelength and half angle.

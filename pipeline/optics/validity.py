@@ -1,4 +1,4 @@
-"""Where the scalar model ends: its largest errors against rigorous coupled waves, as manifest and README quote them.
+"""Where the scalar model ends: its largest errors against coupled waves, as manifests and docs/accuracy.md have them.
 
 The error is that of an order's efficiency, a share of what the flat surface reflects, in unpolarised light: the first
 order of sinusoids and of blazes with a vertical facet, of aluminium and of a dielectric of n = 1.5, under 0 and 30

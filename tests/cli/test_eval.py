@@ -42,7 +42,7 @@ def test_bundle_and_config_agree(baked: Tool) -> None:
 
 def test_a_node_of_the_table_is_the_reference(tool: Tool) -> None:
     """The mirror direction is a node for every light, w still varies, and both integrate every nanometre: what is
-    left is the table's own error, 1e-4 of the local value (README, "How exact, how fast")."""
+    left is the table's own error, 1e-4 of the local value (docs/accuracy.md, "Numerical range")."""
     config = tool.config(table={"step_nm": 1.0})
     asked = rows([(theta, 20, theta, 200) for theta in (0, 10, 30, 50, 70)])
     table, exact = xyz(ask(tool, config, text=asked)), xyz(ask(tool, config, "--exact", text=asked))

@@ -1,4 +1,4 @@
-"""Every command that README prints works as printed."""
+"""Every command that README and docs/usage.md print works as printed, and every page they link exists."""
 
 import re
 import shlex
@@ -10,18 +10,29 @@ import pytest
 
 from tests.cli.tool import REPOSITORY, Tool, recipe
 
-README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-# commands stand alone, or first in a line with what they do two spaces further
-_LINE = re.compile(r"^    (?:\.venv/bin/)?diffract-bake (.+?)(?: {2,}.*)?$", re.MULTILINE)
+PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    "ARCHITECTURE.md",
+    *sorted(f"docs/{path.name}" for path in (REPOSITORY / "docs").glob("*.md")),
+)
+TEXTS = {name: (REPOSITORY / name).read_text(encoding="utf-8") for name in PAGES}
+USAGE = TEXTS["docs/usage.md"]
+GUIDE = TEXTS["README.md"] + USAGE
+# a command is alone in its indented line, or two spaces before its explanation
+_LINE = re.compile(r"^ {4,}(?:\.venv/bin/)?diffract-bake (.+?)(?: {2,}.*)?$", re.MULTILINE)
 _ALSO = re.compile(r"also: (store \w+), (store \w+)$", re.MULTILINE)
-COMMANDS = [*_LINE.findall(README), *(command for pair in _ALSO.findall(README) for command in pair)]
-TARGETS = sorted({*re.findall(r"\bmake ([a-z][a-z0-9-]*)", README)})
+COMMANDS = [*_LINE.findall(GUIDE), *(command for pair in _ALSO.findall(GUIDE) for command in pair)]
+# in prose, a target is in a code span
+_TARGET = re.compile(r"(?:^ {4,}|`|; )make ([a-z][a-z0-9-]*)", re.MULTILINE)
+TARGETS = sorted({*_TARGET.findall("\n".join(TEXTS.values()))})
+_LINK = re.compile(r"\]\(([^)#:]+)[^):]*\)")
 # what these do takes longer than the rest of this folder together
 SLOW = ("run configs/", "bench ", "validate --bench", "stress ")
 
 
 def test_commands_are_found() -> None:
-    lines = [line for line in README.splitlines() if re.match(r"    \S*diffract-bake ", line)]
+    lines = [line for line in GUIDE.splitlines() if re.match(r" {4,}\S*diffract-bake ", line)]
     assert len(lines) + 2 == len(COMMANDS) >= 15
     from cli.main import _COMMANDS
 
@@ -65,10 +76,23 @@ def test_make_targets_exist_and_are_told() -> None:
         assert f"make {target}" in told
 
 
+@pytest.mark.parametrize("name", PAGES)
+def test_links_lead_somewhere(name: str) -> None:
+    """Pages and pictures, from the folder of the page that links them."""
+    folder = (REPOSITORY / name).parent
+    missing = [target for target in _LINK.findall(TEXTS[name]) if not (folder / target).exists()]
+    assert not missing
+
+
+def test_pictures_have_a_page() -> None:
+    linked = {Path(target).name for text in TEXTS.values() for target in _LINK.findall(text)}
+    assert {path.name for path in (REPOSITORY / "docs").glob("*.png")} <= linked
+
+
 def test_exit_codes_are_those_of_the_code() -> None:
     from pipeline import errors
 
-    table = {int(code) for code in re.findall(r"^\| (\d+) \|", README, re.MULTILINE)}
+    table = {int(code) for code in re.findall(r"^\| (\d+) \|", USAGE, re.MULTILINE)}
     raised = {cls.exit_code for cls in vars(errors).values() if isinstance(cls, type) and hasattr(cls, "exit_code")}
     assert table == {0, 130} | raised
 
@@ -77,11 +101,11 @@ def test_every_config_and_every_key_is_told() -> None:
     from pipeline.config.models import Config
 
     for path in (REPOSITORY / "configs").glob("*.toml"):
-        assert f"`{path.stem}`" in README or f"configs/{path.name}" in README
+        assert f"`{path.stem}`" in USAGE or f"configs/{path.name}" in USAGE
     for name, field in Config.model_fields.items():
         section = field.annotation
         if name in ("name", "scene"):
             continue
-        row = next(line for line in README.splitlines() if line.startswith(f"| `[{name}]`"))
+        row = next(line for line in USAGE.splitlines() if line.startswith(f"| `[{name}]`"))
         keys = {*getattr(section, "model_fields", {})} - {"recipe"}
         assert all(f"`{key}`" in row for key in keys), name

@@ -1,4 +1,4 @@
-"""`validate --bench`: what it prints and writes, with pages made here; README's test runs the real ones."""
+"""`validate --bench`: what it prints and writes, with pages made here; test_readme.py runs the real ones."""
 
 import json
 from html.parser import HTMLParser
