@@ -28,8 +28,8 @@ def load_scan(path: str | Path, **keys: Any) -> HeightField:
     Returns the height field: heights_um, float64 (ny, nx), um, x growing with the column and y up with the row;
     pitch_um, (x, y), um. Holes are filled, the surface is levelled (by a plane unless told otherwise) and centred.
 
-    Raises ConfigError for keys that are wrong; ScanError where the file cannot be read or trusted, or lacks a unit: the
-    message names the key to give.
+    Raises ConfigError for keys that are wrong; ScanError where the file cannot be read or trusted, or lacks a unit
+    (it names the key to give).
     """
     from pipeline.surface import load
     from pipeline.surface.conditioning import condition
