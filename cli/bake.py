@@ -1,8 +1,5 @@
 """`run` and `plan`: what a config needs, and doing it."""
 
-import os
-import shutil
-import time
 from pathlib import Path
 from typing import Any
 
@@ -40,16 +37,23 @@ def bake_all(
     paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, *, with_bundle: bool
 ) -> None:
     """Every stage of CONFIGs, what people look at laid out, and what came of it told."""
+    from pipeline.errors import AccuracyError
+    from pipeline.store import scratch
+
     loaded = load_all(paths)
     for config in loaded:
-        require_folder(out / config.name)
-    results = [_bake(config, out, store_root, with_bundle) for config in loaded]
+        scratch.require_folder(out / config.name)
+    baked = [_bake(config, out, store_root, with_bundle) for config in loaded]
+    results = [result for result, _ in baked]
     if as_json:
         console.print_json(results)
     else:
         for result in results:
             _tell(result)
-    _refuse_missed_budgets([result["stages"]["validate"]["summary"]["budget"] | result for result in results])
+    # everything was baked and written, but a budget that was asked for and not met is a failure
+    missed = [line for _, line in baked if line is not None]
+    if missed:
+        raise AccuracyError("\n".join(missed))
 
 
 def _bake_until(loaded: list[Config], until: str, store_root: Path | None, as_json: bool) -> None:
@@ -81,20 +85,6 @@ def _certified(certificate: dict[str, Any]) -> str:
     )
 
 
-def _refuse_missed_budgets(results: list[dict[str, Any]]) -> None:
-    """Everything was baked and written, but a budget that was asked for and not met is a failure."""
-    from pipeline.errors import AccuracyError
-
-    lines = [
-        f"{r['name']}: accuracy.delta_e asks for {r['delta_e']:g} at {r['exposure_ru']:g} RU, measured "
-        f"{r['measured']:.3g}. Raise the budget, use the polar layout, or a finer table."
-        for r in results
-        if r["met"] is False
-    ]
-    if lines:
-        raise AccuracyError("\n".join(lines))
-
-
 def load_all(paths: tuple[Path, ...]) -> list[Config]:
     """All configs, each of its own name: two of one name would write into one folder. Raises ConfigError."""
     from pipeline.errors import ConfigError
@@ -108,58 +98,31 @@ def load_all(paths: tuple[Path, ...]) -> list[Config]:
     return loaded
 
 
-def require_folder(folder: Path) -> None:
-    """Better told now than after the work, and nothing is made yet. Raises StorageError."""
-    from pipeline.errors import StorageError
-
-    standing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not (standing.is_dir() and os.access(standing, os.W_OK | os.X_OK)):
-        raise StorageError(f"{folder}: cannot be written, for {standing} is no folder to write in; see --out")
-
-
-def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> dict[str, Any]:
-    from pipeline.stages import run
+def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> tuple[dict[str, Any], str | None]:
+    """What came of a config, for machines, and a line where it missed its budget."""
+    from pipeline.bundle import bake
 
     store = console.open_store(store_root)
     console.note(f"{config.name}:")
 
     with console.showing_progress() as progress:
-        artifacts = run.execute(config, run.plan(config, store), store, progress, console.teller(config, store))
-        files = _lay_out(store, artifacts, out / config.name)
-        bundle = publish_bundle(config, store, artifacts, out / config.name, progress) if with_bundle else None
-    return {
+        made = bake.make(config, store, out / config.name, progress, console.teller(config, store))
+        bundle = publish_bundle(config, store, made.artifacts, out / config.name, progress) if with_bundle else None
+    result = {
         "name": config.name,
-        "stages": {name: {"key": a.key, "summary": a.summary} for name, a in artifacts.items()},
-        "files": [str(path) for path in files],
+        "stages": {name: {"key": a.key, "summary": a.summary} for name, a in made.artifacts.items()},
+        "files": [str(path) for path in made.files],
         "bundle": None if bundle is None else str(bundle),
     }
+    return result, made.missed_budget
 
 
-def _lay_out(store: Any, artifacts: dict[str, Any], folder: Path) -> list[Path]:
-    """Copies what people look at out of the store."""
-    from pipeline.stages.validate import REPORT
-    from pipeline.store import scratch
-    from pipeline.store.store import writing
+def publish_bundle(config: Config, store: Any, artifacts: Any, folder: Path, progress: Any) -> Path:
+    """The bundle in `folder`; how long it took is told."""
+    from pipeline.bundle.bake import publish_once
 
-    maps, report = (store.open(name, artifacts[name].key) for name in ("render", "validate"))
-    sources_of = [*(maps.folder / name for name in sorted(maps.record["files"])), report.folder / REPORT]
-    with writing(folder), scratch.replacing(folder) as beside:
-        for source in sources_of:
-            shutil.copyfile(source, beside / source.name)
-    return [folder / source.name for source in sources_of]
-
-
-def publish_bundle(config: Config, store: Any, artifacts: dict[str, Any], folder: Path, progress: Any) -> Path:
-    from pipeline.bundle.publish import publish, published
-
-    standing = published(config, {name: a.key for name, a in artifacts.items()}, folder)
-    if standing is not None:
-        console.note("  bundle    cached")
-        return standing
-    started = time.perf_counter()
-    opened = {name: store.open(name, artifact.key) for name, artifact in artifacts.items()}
-    bundle = publish(config, opened, folder, progress)
-    console.note(f"  bundle    {time.perf_counter() - started:.1f} s")
+    bundle, seconds = publish_once(config, store, artifacts, folder, progress)
+    console.note("  bundle    " + ("cached" if seconds is None else f"{seconds:.1f} s"))
     return bundle
 
 

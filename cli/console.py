@@ -45,11 +45,9 @@ def out_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def open_store(root: Path | None) -> Any:
     """The store at `root`, or the user's own."""
-    import platformdirs
+    from pipeline.store.store import Store, users_folder
 
-    from pipeline.store.store import Store
-
-    return Store(root or Path(platformdirs.user_cache_dir("diffract-bake")) / "store")
+    return Store(root or users_folder())
 
 
 class FiniteNumber(click.ParamType[float]):

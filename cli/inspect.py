@@ -11,11 +11,27 @@ from cli import console
 
 
 @click.command("inspect")
-@click.argument("source", type=click.Path(path_type=Path, exists=True))
+@click.argument("source", type=click.Path(path_type=Path, exists=True), required=False)
 @click.option("--channel", help="The channel of a scan file that holds several.")
+@click.option(
+    "--schema",
+    type=click.Choice(["config", "manifest"]),
+    help="The JSON Schema of every config, or of every bundle's manifest.json, instead of a SOURCE.",
+)
 @console.json_option
-def inspect_command(source: Path, channel: str | None, as_json: bool) -> None:
-    """Say what SOURCE holds: a scan file, a config or a bundle's folder. Bakes nothing."""
+def inspect_command(source: Path | None, channel: str | None, schema: str | None, as_json: bool) -> None:
+    """Say what SOURCE holds: a scan file, a config or a bundle's folder. Bakes nothing.
+
+    With --schema and no SOURCE: which keys a config or a manifest.json may hold, as a JSON Schema, for editors that
+    complete and check, and for programs.
+    """
+    if schema is not None:
+        if source is not None or channel is not None:
+            raise click.UsageError("--schema takes no SOURCE and no --channel")
+        console.print_json(_schema(schema))
+        return
+    if source is None:
+        raise click.UsageError("Missing argument 'SOURCE'; or --schema for what may be in one")
     if source.is_dir():
         found = _bundle(source)
     elif source.suffix == ".toml":
@@ -27,6 +43,18 @@ def inspect_command(source: Path, channel: str | None, as_json: bool) -> None:
         return
     for key, value in found.items():
         click.echo(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
+
+
+def _schema(document: str) -> dict[str, Any]:
+    from pipeline.config import schema
+
+    if document == "config":
+        from pipeline.config.models import Config
+
+        return schema.of(Config, "Config of diffract-bake", "validation")
+    from pipeline.bundle.manifest import Manifest
+
+    return schema.of(Manifest, "manifest.json of a diffract-bake bundle", "serialization")
 
 
 def _bundle(folder: Path) -> dict[str, Any]:

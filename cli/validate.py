@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from cli import console, sources
-from cli.bake import bake_all, require_folder
+from cli.bake import bake_all
 
 
 @click.command("validate")
@@ -58,8 +58,9 @@ def validate_command(
 def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root: Path | None, as_json: bool) -> None:
     from pipeline.evaluation.figures import pages
     from pipeline.evaluation.figures.figure import Bench
+    from pipeline.store import scratch
 
-    require_folder(folder)
+    scratch.require_folder(folder)
     store = console.open_store(store_root)
     configs = _configs({"blazed": None, **roles})
     bench = Bench(**{role: _surface(role, config, store) for role, config in configs.items()}, quick=quick)

@@ -1,4 +1,4 @@
-"""A bundle as a source of light: for `diffract-bake eval BUNDLE`."""
+"""A bundle as a source of light, once it is known to be unharmed."""
 
 from pathlib import Path
 
@@ -9,11 +9,16 @@ from pipeline.tables.evaluate import Evaluator
 
 
 def bundle_evaluator(folder: Path) -> Evaluator:
-    """XYZ from a bundle's own tables and numbers. Raises DamagedError where the bundle has faults.
+    """XYZ from a bundle's own tables and numbers. Raises DamagedError where the bundle has faults."""
+    return open_bundle(folder).xyz
+
+
+def open_bundle(folder: Path) -> Bundle:
+    """A bundle in memory. Raises DamagedError where it has faults.
 
     The code that runs is this project's evaluate.py, never the bundle's copy.
     """
     faults = verify(folder)
     if faults:
         raise DamagedError(f"{folder}: {summary(faults)}. Fetch the bundle again, or publish it again")
-    return Bundle(folder).xyz
+    return Bundle(folder)

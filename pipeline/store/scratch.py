@@ -9,6 +9,8 @@ import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
+from pipeline.errors import StorageError
+
 _REPLACING = ".writing-"
 _FOREIGN_ABANDONED_AFTER_S = 24 * 3600.0
 
@@ -53,6 +55,13 @@ def replacing(folder: Path) -> Iterator[Path]:
             file.replace(folder / file.name)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+def require_folder(folder: Path) -> None:
+    """Better told before the work than after it, and nothing is made yet. Raises StorageError."""
+    standing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not (standing.is_dir() and os.access(standing, os.W_OK | os.X_OK)):
+        raise StorageError(f"{folder}: cannot be written, for {standing} is no folder to write in; see --out")
 
 
 def _alive(pid: int) -> bool:

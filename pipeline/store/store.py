@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import platformdirs
 from filelock import FileLock
 
 from pipeline.errors import DamagedError, StorageError
@@ -67,6 +68,12 @@ class Artifact:
     @property
     def bytes(self) -> int:
         return sum(int(entry["bytes"]) for entry in self.record["files"].values())
+
+
+def users_folder() -> Path:
+    """Where artifacts are kept unless told otherwise: $DIFFRACT_BAKE_STORE, or the user's cache folder."""
+    named = os.environ.get("DIFFRACT_BAKE_STORE")
+    return Path(named) if named else Path(platformdirs.user_cache_dir("diffract-bake")) / "store"
 
 
 class Store:
