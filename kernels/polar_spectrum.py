@@ -15,9 +15,9 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     follows it in E, tile by tile. `series` (terms, s nodes) holds (2 - [n = 0]) J_n(s H).
     """
     terms, nodes = series.shape
-    sizes = blocks.chosen("RADII", "S_BLOCK")
+    block = blocks.chosen("S_BLOCK")["S_BLOCK"]
     # a flat surface has fewer nodes than a block
-    columns = max(nodes, sizes["S_BLOCK"])
+    columns = max(nodes, block)
     # i^n, n = 2 m or 2 m + 1: the kernel keeps even and odd terms apart, which leaves (-1)^m
     signs = (-1.0) ** (np.arange(terms) // 2)
     padded = np.zeros((LANES * stack.blocks, columns), np.float32)
@@ -30,7 +30,7 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     result = device.shared(out)
     program.launch(
         "polar_spectrum",
-        (-(-len(radius_per_um) // sizes["RADII"]), len(tiles)),
+        (len(radius_per_um), len(tiles)),
         stack.buffer,
         stack.decay,
         stack.grid,

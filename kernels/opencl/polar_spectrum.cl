@@ -16,10 +16,10 @@
  *   fx_max, fy_max                                   the scan's band, 1/um: beyond it nothing is known and E = 0
  *
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
- * the point. One work-item, RADII radii and the sixteen azimuths of a tile.
+ * the point. One work-item, one radius and the sixteen azimuths of a tile.
  *
  * Given at launch: terms, even; the stack's blocks; s_nodes, at least S_BLOCK; reach_x and reach_y. Set by the host:
- * RADII; S_BLOCK, nodes whose sums stay in registers; USUAL_TAPS, the width of a window whose loop along x is written
+ * S_BLOCK, nodes whose sums stay in registers; USUAL_TAPS, the width of a window whose loop along x is written
  * out; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
  */
 
@@ -179,31 +179,23 @@ static void power_at_nodes(const float16 *re, const float16 *im, const int16 tur
 __kernel void polar_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
                              __global const double *radius, const int radii, __global const double *azimuth,
                              __global const float *series, const int terms, const int blocks, const int s_nodes,
-                             const int reach_x, const int reach_y, const double fx_max, const double fy_max, __global float *spectrum) {
-    const int first = RADII * get_global_id(0), count = min(RADII, radii - first), tile = get_global_id(1);
-    const int taps_x = 2 * reach_x + 1, taps_y = 2 * reach_y + 1;
-    __global float *here = spectrum + ((long)tile * radii + first) * 16 * s_nodes;
-    __global float *opposite = here + (long)get_global_size(1) * radii * 16 * s_nodes;
+                             const int reach_x, const int reach_y, const double fx_max, const double fy_max,
+                             __global float *spectrum) {
+    const int ring = get_global_id(0), tile = get_global_id(1), tiles = get_global_size(1);
+    __global float *here = spectrum + ((long)tile * radii + ring) * 16 * s_nodes;
+    __global float *opposite = here + (long)tiles * radii * 16 * s_nodes;
 
-    Window window[RADII];
-    ROLLED for (int i = 0; i < count; ++i)
-        place_window(grid, decay, azimuth + 32 * tile, radius[first + i], fx_max, fy_max, reach_x, reach_y, window + i);
-    /* of every radius: real parts, then imaginary parts; radii lie apart by an odd number of pairs of cache lines, or
-     * those of one azimuth would drive each other, and the stack, out of the nearest cache */
-    float16 f_n[RADII * (2 * MOST_BLOCKS * 16 + 2)];
-    const int apart = 32 * blocks + 2;
-    /* radii inside: the next one's window lies in almost the same cells */
+    Window window;
+    place_window(grid, decay, azimuth + 32 * tile, radius[ring], fx_max, fy_max, reach_x, reach_y, &window);
+    /* real parts, then imaginary parts */
+    float16 f_n[2 * MOST_BLOCKS * 16];
     ROLLED for (int lane = 0; lane < 16; ++lane)
-        ROLLED for (int i = 0; i < count; ++i)
-            gather_azimuth(stack, grid.columns, blocks, taps_x, taps_y, window + i, lane, f_n + apart * i);
-    ROLLED for (int i = 0; i < count; ++i) {
-        float16 *re = f_n + apart * i, *im = re + 16 * blocks;
-        ROLLED for (int part = 0; part < 2 * blocks; ++part) transpose(re + 16 * part);
-        ROLLED for (int s = 0; s < s_nodes; s += S_BLOCK) {
-            /* the last block begins earlier where nodes fill no whole one */
-            const int node = min(s, s_nodes - S_BLOCK);
-            const long place = 16 * ((long)i * s_nodes + node);
-            power_at_nodes(re, im, window[i].turned, terms, s_nodes, series + node, here + place, opposite + place);
-        }
+        gather_azimuth(stack, grid.columns, blocks, 2 * reach_x + 1, 2 * reach_y + 1, &window, lane, f_n);
+    ROLLED for (int part = 0; part < 2 * blocks; ++part) transpose(f_n + 16 * part);
+    ROLLED for (int s = 0; s < s_nodes; s += S_BLOCK) {
+        /* the last block begins earlier where nodes fill no whole one */
+        const int node = min(s, s_nodes - S_BLOCK);
+        power_at_nodes(f_n, f_n + 16 * blocks, window.turned, terms, s_nodes, series + node, here + 16 * node,
+                       opposite + 16 * node);
     }
 }

@@ -160,6 +160,6 @@ def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypat
 
 
 def test_every_page_is_there() -> None:
-    folder = REPOSITORY / "pipeline" / "figures"
+    folder = REPOSITORY / "pipeline" / "evaluation" / "figures"
     with_make = {path.stem for path in folder.glob("*.py") if "\ndef make(" in path.read_text(encoding="utf-8")}
     assert with_make == set(pages.PAGES)

@@ -24,7 +24,9 @@ def test_memory_serves_again_once_nothing_refers_to_it():
     view[...] = 1.0
     del view
     gc.collect()
-    assert place in {device.empty((1 << 20,), np.float64).ctypes.data for _ in range(2)}
+    # more than the pool holds: whatever other tests left in it is taken too
+    taken = [device.empty((1 << 20,), np.float64) for _ in range(40)]
+    assert place in {array.ctypes.data for array in taken}
 
 
 def test_two_arrays_never_share():

@@ -13,7 +13,6 @@ _KERNELS = {
     "STEP_Y": ("along_y",),
     "KEPT": ("along_x", "along_y"),
     "S_BLOCK": ("polar_spectrum",),
-    "RADII": ("polar_spectrum",),
     "USUAL_TAPS": ("polar_spectrum",),
     "W_BLOCK": ("apply_operator",),
     "SHARE_BLOCK": ("apply_operator",),
