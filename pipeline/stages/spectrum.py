@@ -23,7 +23,9 @@ from pipeline.tables.planning import plan
 _FILE = "spectrum.zarr"
 # from the stack to tables of a spectrum: the plan measures with them
 PLANNING_KERNELS = ("dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl")
-# by its key, what this process made last: the table that follows takes longer to read it back than to use it
+# By its key, the power spectrum that this process made last: table and validation take longer to read it back than to
+# use it. A large one serves the table alone, and then leaves its memory to the reference.
+_KEPT_BYTES = 2**28
 _just_made: dict[str, spectrum.PolarSpectrum] = {}
 
 
@@ -100,9 +102,12 @@ def planned(artifact: Artifact) -> plan.Plan:
 
 
 def load(artifact: Artifact) -> spectrum.PolarSpectrum:
-    """The power spectrum of a spectrum artifact; the first time from memory, where this process has just made it."""
-    if artifact.key in _just_made:
-        return _just_made.pop(artifact.key)
+    """The power spectrum of a spectrum artifact, from memory where this process has just made it."""
+    made = _just_made.get(artifact.key)
+    if made is not None:
+        if made.values.nbytes > _KEPT_BYTES:
+            _just_made.clear()
+        return made
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     return spectrum.PolarSpectrum(
