@@ -61,7 +61,8 @@ class Probe:
     """One listed device and whether it works.
 
     vector_width: floats of a vector register that its compiler builds for. fault: empty where it works.
-    context: the one that it was tried in; PoCL loads its library of built-in functions anew for every context.
+    context: the one that it was tried in, None where none could be made; PoCL loads its library of built-in functions
+        anew for every context.
     """
 
     platform: str
@@ -148,8 +149,9 @@ def _listed() -> list[tuple[Any, Any]]:
 def _probe(platform: Any, device: Any) -> Probe:
     cl = _opencl()
     name, driver = device.name.strip(), f"{device.driver_version}, {device.version.strip()}"
-    fault, out, context = "", np.zeros(4), cl.Context([device])
+    fault, out, context = "", np.zeros(4), None
     try:
+        context = cl.Context([device])
         with _compiling(f"{driver} {name} {_PROBE}"):
             queue = cl.CommandQueue(context)
             buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, out.nbytes)

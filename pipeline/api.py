@@ -21,7 +21,7 @@ _UNIT = 1e-4
 def load_scan(path: str | Path, **keys: Any) -> HeightField:
     """Reads a scan file and cleans it as a config's [surface] does.
 
-    path: a file of any format that README lists.
+    path: a file of any format that docs/usage.md lists.
     keys: those of [surface], with its units and defaults: channel, pitch_um (um, one number or (x, y)), height_unit,
         height_range_um (um), override_file_units, level, clip_percentile ((low, high), percent).
 

@@ -68,6 +68,16 @@ def test_doctor_for_machines(tool: Tool) -> None:
     assert told["versions"]["diffract-bake"]
 
 
+def test_a_device_without_a_context_is_a_fault_and_no_traceback() -> None:
+    """A driver that lists a device and cannot open it is reported by doctor, beside those that work."""
+    refused = mock.patch.object(pyopencl, "Context", side_effect=pyopencl.Error("no such context"))
+    platform, listed = device._listed()[0]
+    with refused:
+        probe = device._probe(platform, listed)
+    assert "no such context" in probe.fault
+    assert probe.context is None
+
+
 def test_errors_of_the_compiler_come_through() -> None:
     broken = mock.patch.object(device, "source", return_value="__kernel void broken() { undeclared = 1; }")
     with broken, pytest.raises(pyopencl.Error, match="undeclared"):
