@@ -9,14 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 # dft_stack: STEP_X and STEP_Y of the first step's k1, with sums of two and of four vectors, and KEPT frequencies of
-# the second step, with two. polar_spectrum: S_BLOCK nodes in s, with four; USUAL_TAPS, 2 reach_x + 1 of a patch of
-# four sigma, whose loop along x is written out. spectral_operator: W_BLOCK nodes of w with two vectors, and
+# the second step, with two. polar_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose window's loop
+# along x is written out. spectral_operator: W_BLOCK nodes of w with two vectors, and
 # SHARE_BLOCK nodes of w with six.
 _CHOSEN = {
     "STEP_X": 2,
     "STEP_Y": 1,
     "KEPT": 2,
-    "S_BLOCK": 1,
     "USUAL_TAPS": 7,
     "W_BLOCK": 2,
     "SHARE_BLOCK": 1,
@@ -26,7 +25,6 @@ OTHERS = {
     "STEP_X": 10,
     "STEP_Y": 5,
     "KEPT": 10,
-    "S_BLOCK": 4,
     "USUAL_TAPS": 0,
     "W_BLOCK": 4,
     "SHARE_BLOCK": 4,

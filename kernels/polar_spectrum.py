@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kernels import blocks, device, programs
+from kernels import device, programs
 from kernels.diffraction import DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
@@ -15,18 +15,15 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     follows it in E, tile by tile. `series` (terms, s nodes) holds (2 - [n = 0]) J_n(s H).
     """
     terms, nodes = series.shape
-    block = blocks.chosen("S_BLOCK")["S_BLOCK"]
-    # a flat surface has fewer nodes than a block
-    columns = max(nodes, block)
     # i^n, n = 2 m or 2 m + 1: the kernel keeps even and odd terms apart, which leaves (-1)^m
     signs = (-1.0) ** (np.arange(terms) // 2)
-    padded = np.zeros((LANES * stack.blocks, columns), np.float32)
-    padded[:terms, :nodes] = signs[:, None] * series
+    padded = np.zeros((LANES * stack.blocks, nodes), np.float32)
+    padded[:terms] = signs[:, None] * series
     tiles = azimuth_rad.reshape(-1, LANES)
     directions = np.stack([np.cos(tiles), np.sin(tiles)], axis=1)
     program = programs.polar(term_blocks=stack.blocks)
     radius, direction, terms_at_s = (device.upload(a) for a in (radius_per_um, directions, padded))
-    out = device.empty((2 * len(tiles), len(radius_per_um), columns, LANES), np.float32)
+    out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
     result = device.shared(out)
     program.launch(
         "polar_spectrum",
@@ -38,9 +35,8 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
         np.int32(len(radius_per_um)),
         direction,
         terms_at_s,
-        *(np.int32(n) for n in (terms + terms % 2, stack.blocks, columns, *stack.reach)),
+        *(np.int32(n) for n in (terms + terms % 2, stack.blocks, nodes, *stack.reach)),
         *(np.float64(f) for f in stack.band_per_um),
         result,
     )
-    found = device.settle(result, out)
-    return found if columns == nodes else np.ascontiguousarray(found[:, :, :nodes])
+    return device.settle(result, out)

@@ -21,7 +21,7 @@ def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Pr
     """
     constants = {
         **_stack("float", 16),
-        **blocks.chosen("S_BLOCK", "USUAL_TAPS", "W_BLOCK", "SHARE_BLOCK"),
+        **blocks.chosen("USUAL_TAPS", "W_BLOCK", "SHARE_BLOCK"),
         "MOST_BLOCKS": device.bound(term_blocks, _MOST_BLOCKS),
         "MOST_S_NODES": device.bound(s_nodes, _MOST_S_NODES),
         "MOST_W_TERMS": device.bound(w_terms, _MOST_W_TERMS),

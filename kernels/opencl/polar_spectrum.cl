@@ -18,9 +18,8 @@
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
  * the point. One work-item, one radius and the sixteen azimuths of a tile.
  *
- * Given at launch: terms, even; the stack's blocks; s_nodes, at least S_BLOCK; reach_x and reach_y. Set by the host:
- * S_BLOCK, nodes whose sums stay in registers; USUAL_TAPS, the width of a window whose loop along x is written
- * out; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
+ * Given at launch: terms, even; the stack's blocks; s_nodes; reach_x and reach_y. Set by the host: USUAL_TAPS, the width
+ * of a window whose loop along x is written out; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
@@ -153,27 +152,22 @@ static void gather_azimuth(__global const float *stack, const int columns, const
     }
 }
 
-/* E at S_BLOCK nodes in s from F_n, azimuths side by side: [terms], then those of the opposite azimuths */
-static void power_at_nodes(const float16 *re, const float16 *im, const int16 turned, const int terms, const int s_nodes,
-                           __global const float *series, __global float *here, __global float *opposite) {
-    float16 even_re[S_BLOCK], even_im[S_BLOCK], odd_re[S_BLOCK], odd_im[S_BLOCK];
-    UNROLL for (int j = 0; j < S_BLOCK; ++j) even_re[j] = even_im[j] = odd_re[j] = odd_im[j] = 0.0f;
+/* E at one node in s from F_n, [terms], azimuths side by side; `opposite` takes those of the opposite azimuths */
+static void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms, const int s_nodes,
+                          __global const float *series, __global float *here, __global float *opposite) {
+    float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
     ROLLED for (int n = 0; n < terms; n += 2) {
-        __global const float *even = series + n * s_nodes, *odd = even + s_nodes;
-        UNROLL for (int j = 0; j < S_BLOCK; ++j) {
-            even_re[j] = fma((float16)even[j], re[n], even_re[j]);
-            even_im[j] = fma((float16)even[j], im[n], even_im[j]);
-            odd_re[j] = fma((float16)odd[j], re[n + 1], odd_re[j]);
-            odd_im[j] = fma((float16)odd[j], im[n + 1], odd_im[j]);
-        }
+        const float16 even = series[n * s_nodes], odd = series[(n + 1) * s_nodes];
+        even_re = fma(even, re[n], even_re);
+        even_im = fma(even, im[n], even_im);
+        odd_re = fma(odd, re[n + 1], odd_re);
+        odd_im = fma(odd, im[n + 1], odd_im);
     }
-    UNROLL for (int j = 0; j < S_BLOCK; ++j) {
-        const float16 plus_re = even_re[j] - odd_im[j], plus_im = even_im[j] + odd_re[j];
-        const float16 minus_re = even_re[j] + odd_im[j], minus_im = even_im[j] - odd_re[j];
-        const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
-        STORE(select(plus, minus, turned), here + 16 * j);
-        STORE(select(minus, plus, turned), opposite + 16 * j);
-    }
+    const float16 plus_re = even_re - odd_im, plus_im = even_im + odd_re;
+    const float16 minus_re = even_re + odd_im, minus_im = even_im - odd_re;
+    const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
+    STORE(select(plus, minus, turned), here);
+    STORE(select(minus, plus, turned), opposite);
 }
 
 __kernel void polar_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
@@ -192,10 +186,6 @@ __kernel void polar_spectrum(__global const float *stack, __global const float *
     ROLLED for (int lane = 0; lane < 16; ++lane)
         gather_azimuth(stack, grid.columns, blocks, 2 * reach_x + 1, 2 * reach_y + 1, &window, lane, f_n);
     ROLLED for (int part = 0; part < 2 * blocks; ++part) transpose(f_n + 16 * part);
-    ROLLED for (int s = 0; s < s_nodes; s += S_BLOCK) {
-        /* the last block begins earlier where nodes fill no whole one */
-        const int node = min(s, s_nodes - S_BLOCK);
-        power_at_nodes(f_n, f_n + 16 * blocks, window.turned, terms, s_nodes, series + node, here + 16 * node,
-                       opposite + 16 * node);
-    }
+    ROLLED for (int j = 0; j < s_nodes; ++j)
+        power_at_node(f_n, f_n + 16 * blocks, window.turned, terms, s_nodes, series + j, here + 16 * j, opposite + 16 * j);
 }

@@ -12,7 +12,6 @@ _KERNELS = {
     "STEP_X": ("along_x",),
     "STEP_Y": ("along_y",),
     "KEPT": ("along_x", "along_y"),
-    "S_BLOCK": ("polar_spectrum",),
     "USUAL_TAPS": ("polar_spectrum",),
     "W_BLOCK": ("apply_operator",),
     "SHARE_BLOCK": ("apply_operator",),
