@@ -91,7 +91,7 @@ class _Measure:
         self._config, self._most, self._unit = config, most_textures(table), relative_unit(config)
         self._wi, self._wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
         reference = reference_of(field, config)
-        self._truth = reference.xyz(config.spectrum, config.material, self._wi, self._wr)
+        self._truth = reference.xyz(config.light, config.material, self._wi, self._wr)
         evaluate = table_evaluator(table, config)
         self._mirrored = self._wi * [-1.0, -1.0, 1.0]
         self._before, self._mirror = (evaluate(self._wi, views) for views in (self._wr, self._mirrored))

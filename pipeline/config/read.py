@@ -6,8 +6,10 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from pipeline.config.models import Config, Recipe, TaylorLayout
+from pipeline.config.models import Config
 from pipeline.errors import ConfigError
+from pipeline.surface.recipes.parameters import Recipe
+from pipeline.tables.taylor.layout import TaylorLayout
 
 _LAYOUTS = ("polar", "taylor")
 _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))

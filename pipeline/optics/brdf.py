@@ -11,10 +11,11 @@ from math import pi
 
 import numpy as np
 
-from pipeline.config.models import FINE_STEP_NM, Config, Material, Spectrum
+from pipeline.config.models import Config
 from pipeline.optics import fresnel, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
+from pipeline.optics.material import Material
 
 
 def direction_factor(material: Material, quadrature: Quadrature, wi: Array, wr: Array) -> Array:
@@ -42,21 +43,21 @@ def geometry_factor(material: Material, wi: Array, wr: Array) -> Array:
     return factor * geometry.v_cavity(wi, wr) if material.shadowing else factor
 
 
-def illumination(material: Material, spectrum: Spectrum, sigma_um: float, step_nm: float) -> Quadrature:
+def illumination(material: Material, light: Light, sigma_um: float, step_nm: float) -> Quadrature:
     """Light, observer and the window's area, as one quadrature for R |P|^2."""
-    quadrature = trapezoid(spectrum, step_nm)
+    quadrature = trapezoid(light, step_nm)
     area = window_area(material, quadrature, sigma_um)
     return Quadrature(quadrature.lambda_nm, quadrature.weights * area[:, None])
 
 
 def illumination_of(config: Config) -> Callable[[float], Quadrature]:
     """`illumination` by wavelength step, nm, of a config."""
-    return partial(illumination, config.material, config.spectrum, config.coherence.sigma_um)
+    return partial(illumination, config.material, config.light, config.coherence.sigma_um)
 
 
 def integrand_of(config: Config) -> Callable[[float], Quadrature]:
     """`integrand` by wavelength step, nm, of a config."""
-    return partial(integrand, config.material, config.spectrum, config.coherence.sigma_um)
+    return partial(integrand, config.material, config.light, config.coherence.sigma_um)
 
 
 def grey(lambda_nm: Array, cos_half: Array) -> Array:
@@ -64,16 +65,16 @@ def grey(lambda_nm: Array, cos_half: Array) -> Array:
     return np.broadcast_to(1.0, (*np.shape(cos_half), len(lambda_nm)))
 
 
-def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Array, cos_half: Array) -> Array:
+def spectral_reflectance(material: Material, light: Light, lambda_nm: Array, cos_half: Array) -> Array:
     """What of R stays inside the spectral integral (..., L) at half angles (...,): a metal's; 1 of all else."""
     if material.fresnel != "conductor":
         return grey(lambda_nm, cos_half)
-    return _metal(material, trapezoid(spectrum, FINE_STEP_NM), lambda_nm, cos_half)
+    return _metal(material, trapezoid(light, FINE_STEP_NM), lambda_nm, cos_half)
 
 
-def integrand(material: Material, spectrum: Spectrum, sigma_um: float, step_nm: float) -> Quadrature:
+def integrand(material: Material, light: Light, sigma_um: float, step_nm: float) -> Quadrature:
     """Light, observer and all of the material that varies with wavelength, as one quadrature for |P|^2."""
-    quadrature = trapezoid(spectrum, step_nm)
+    quadrature = trapezoid(light, step_nm)
     factor = spectral_factor(material, quadrature, sigma_um)
     return Quadrature(quadrature.lambda_nm, quadrature.weights * factor[:, None])
 

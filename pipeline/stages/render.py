@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config.models import Config, Direction
+from pipeline.config.models import Config
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import pixels
 from pipeline.optics.geometry import Array
+from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images
 from pipeline.stages import table
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.tables.evaluate import Map, relative_unit, render_map, table_evaluator
 
 
@@ -20,7 +21,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     return {
         "render": config.render.model_dump(mode="json"),
         "material": material_parameters(config),
-        "spectrum": spectrum_parameters(config),
+        "spectrum": light_parameters(config),
     }
 
 

@@ -10,7 +10,7 @@ from pipeline.diffraction.upload import kernel_digest
 from pipeline.optics import brdf
 from pipeline.progress import Progress
 from pipeline.stages import stack
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.taylor import grid
@@ -23,7 +23,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     material = material_parameters(config)
     return {
         "kernel": kernel_digest("windowed_dft.cl", "taylor_table.cl"),
-        "spectrum": spectrum_parameters(config),
+        "spectrum": light_parameters(config),
         # angles stay outside the table: only what varies with wavelength enters
         "material": {key: material[key] for key in ("normalisation", "metal")},
         "table": config.table.model_dump(mode="json"),

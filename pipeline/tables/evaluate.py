@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.config.models import Config
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.table import PolarTable
@@ -42,7 +42,7 @@ def _outside_factor(table: PolarTable | TaylorTable, config: Config) -> Callable
     """C cos(ti), as far as the table does not hold it: polar tables hold a metal's reflectance at every angle."""
     if isinstance(table, PolarTable) and config.material.fresnel == "conductor":
         return partial(brdf.geometry_factor, config.material)
-    return partial(brdf.direction_factor, config.material, trapezoid(config.spectrum, config.mean_step_nm))
+    return partial(brdf.direction_factor, config.material, trapezoid(config.light, config.mean_step_nm))
 
 
 def _look_up(table: PolarTable | TaylorTable, uvw: Array) -> Array:
@@ -51,7 +51,7 @@ def _look_up(table: PolarTable | TaylorTable, uvw: Array) -> Array:
 
 def relative_unit(config: Config) -> float:
     """Y of 1 RU in a config's normalisation: what exposures are multiples of."""
-    quadrature = trapezoid(config.spectrum, config.mean_step_nm)
+    quadrature = trapezoid(config.light, config.mean_step_nm)
     return brdf.relative_unit(config.material, quadrature, config.coherence.sigma_um)
 
 

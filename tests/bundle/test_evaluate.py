@@ -19,8 +19,8 @@ from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import trapezoid
 from pipeline.stages import table as table_stage
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar import table as polar
@@ -113,7 +113,7 @@ def test_a_shaders_table_of_the_metal_is_as_exact_as_told(normalisation: str) ->
     assert entry.reflectance_table is not None
     assert medium is not None
     wi, wr = random_pairs(None, 2000, SEED)
-    exact = brdf.direction_factor(config.material, trapezoid(config.spectrum, 5.0), wi, wr)
+    exact = brdf.direction_factor(config.material, trapezoid(config.light, 5.0), wi, wr)
     exact /= brdf.geometry_factor(config.material, wi, wr)
     shader = np.interp(geometry.cos_half(wi, wr), *material.reflectance_table(medium)) / entry.divisor
     error = np.abs(shader - exact).max() * entry.divisor

@@ -9,7 +9,7 @@ import pytest
 from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.config.read import parse
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.reference import MeanReference, reference_of
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
@@ -44,11 +44,11 @@ def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
     budget = plan.Budget(found.budget_delta_e, found.accuracy.exposure_ru)
     sigma = found.coherence.sigma_um
     power, chosen = plan.make(
-        windows.places(field_of(found), found.coherence), sigma, found.spectrum, found.scene, budget, found.table
+        windows.places(field_of(found), found.coherence), sigma, found.light, found.scene, budget, found.table
     )
 
     rules = quadrature.choose(brdf.illumination_of(found), chosen.rings.rho(), sigma, budget.quadrature)
-    reflectance = partial(brdf.spectral_reflectance, found.material, found.spectrum)
+    reflectance = partial(brdf.spectral_reflectance, found.material, found.light)
     return polar.build(power, chosen.rings, rules, chosen.w_terms, reflectance), chosen
 
 
@@ -152,7 +152,7 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
     for angle in (0.0, 35.0, 90.0):
         along = x * np.cos(np.radians(angle)) + y * np.sin(np.radians(angle))
         field = HeightField(0.05 * np.cos(2.0 * np.pi * along / 1.2), (0.1, 0.1))
-        stretch, axis = scattering.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
+        stretch, axis = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
         apart = np.angle(np.exp(2j * (axis - np.radians(angle)))) / 2.0
         assert abs(np.degrees(apart)) < 2.0
         # seams of a turned grating scatter too
@@ -162,5 +162,5 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
 def test_an_isotropic_surface_is_not_stretched() -> None:
     rng = np.random.default_rng(4)
     field = HeightField(rng.normal(0.0, 0.03, (120, 120)), (0.1, 0.1))
-    stretch, _ = scattering.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
+    stretch, _ = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
     assert stretch > 0.95

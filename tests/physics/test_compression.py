@@ -7,14 +7,14 @@ import pytest
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
-from pipeline.config.models import Material, Spectrum
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.reference import Reference
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import Light, trapezoid
+from pipeline.optics.material import Material
 from pipeline.tables.evaluate import Map
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
@@ -144,10 +144,10 @@ def test_flattening_changes_no_value_and_saves_digits() -> None:
 
 def snake_table(name: str) -> tuple[PolarTable, Array, Array, Array]:
     """The table of 140 x 1792 texels of a scan, and views at normal incidence: uvw, C cos ti and exact XYZ."""
-    field, light, material, sigma = snake(name), Spectrum(), Material(), 16.25
-    radius = spectrum.radii(sigma, 2.0 / 0.38)
-    stack = spectrum.chebyshev_stack(field, sigma, radius[-1], 16, 1e-5)
-    power = spectrum.build(stack, Azimuths(1792, 0.87), radius, 380.0, 12)
+    field, light, material, sigma = snake(name), Light(), Material(), 16.25
+    radius = power_spectrum.radii(sigma, 2.0 / 0.38)
+    stack = power_spectrum.chebyshev_stack(field, sigma, radius[-1], 16, 1e-5)
+    power = power_spectrum.build(stack, Azimuths(1792, 0.87), radius, 380.0, 12)
     rings = Rings(140, 0.1)
     rules = quadrature.choose(partial(brdf.integrand, material, light, sigma), rings.rho(), sigma, 3e-4)
     # every 29th pixel of the map over which this project states colour errors

@@ -5,20 +5,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from pipeline.config.models import LaserLine, Material, Spectrum
-from pipeline.diffraction import expansion as series
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.light import LaserLine, Light, Quadrature, trapezoid
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import line_points, quadrature, spectral, spectral_integral
 from pipeline.tables.polar import table as polar
 
 SIGMA = 2.0
-LIGHT = Spectrum()
+LIGHT = Light()
 
 
 def rough(ny: int = 120, nx: int = 90, height: float = 0.1, pitch: tuple[float, float] = (0.1, 0.09)) -> HeightField:
@@ -27,13 +26,13 @@ def rough(ny: int = 120, nx: int = 90, height: float = 0.1, pitch: tuple[float, 
 
 
 def spectrum_of(
-    field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0, spacing: float = spectrum.SPACING
-) -> spectrum.PolarSpectrum:
-    z = series.largest_phase(field.half_range_um, lambda_min_nm)
-    terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
-    radius = spectrum.radii(SIGMA, 2e3 / lambda_min_nm, spacing)
-    built = spectrum.chebyshev_stack(field, SIGMA, radius[-1], terms, 1e-6)
-    return spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
+    field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0, spacing: float = power_spectrum.SPACING
+) -> power_spectrum.PolarPowerSpectrum:
+    z = expansion.largest_phase(field.half_range_um, lambda_min_nm)
+    terms, nodes = (expansion.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
+    radius = power_spectrum.radii(SIGMA, 2e3 / lambda_min_nm, spacing)
+    built = power_spectrum.chebyshev_stack(field, SIGMA, radius[-1], terms, 1e-6)
+    return power_spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.6])
@@ -74,7 +73,9 @@ def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
 RHO = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.13, 1.16, 1.9, 1.95, 2.0])
 
 
-def integral_error(field: HeightField, power: spectrum.PolarSpectrum, rule: Quadrature, w_terms: int) -> float:
+def integral_error(
+    field: HeightField, power: power_spectrum.PolarPowerSpectrum, rule: Quadrature, w_terms: int
+) -> float:
     """The largest difference between rings' integrals and the reference's, over the mean and what is there."""
     terms = spectral_integral.integrate(
         power.values,
@@ -111,14 +112,14 @@ def test_a_ring_holds_the_integral_over_wavelengths(
     """Nodes of w by eight and by four. A narrow range averages less of what the radii's distance leaves."""
     field = rough()
     power = spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
-    assert integral_error(field, power, trapezoid(Spectrum(range_nm=range_nm), 5.0), w_terms) < tolerance
+    assert integral_error(field, power, trapezoid(Light(range_nm=range_nm), 5.0), w_terms) < tolerance
 
 
 @pytest.mark.parametrize("step_nm", [60.0, 20.0])
 def test_few_wavelengths_are_their_own_points(step_nm: float) -> None:
     """Nothing averages what interpolation leaves: radii are as near as for a line."""
-    field, light = rough(), Spectrum(range_nm=(500.0, 560.0))
-    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, spectrum.SPACING_OF_A_LINE)
+    field, light = rough(), Light(range_nm=(500.0, 560.0))
+    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, power_spectrum.SPACING_OF_A_LINE)
     rule = trapezoid(light, step_nm)
     rules = quadrature.uniform(rule, len(RHO))
     nodes = power.values.shape[2]
@@ -207,7 +208,7 @@ def test_every_ring_keeps_the_white() -> None:
 
 
 def test_a_laser_line_needs_one_wavelength() -> None:
-    light = Spectrum(illuminant=LaserLine(lambda_nm=532.0))
+    light = Light(illuminant=LaserLine(lambda_nm=532.0))
     rules = quadrature.choose(partial(brdf.integrand, Material(), light, 16.25), np.arange(3.0), 16.25, 1e-3)
     np.testing.assert_array_equal(rules.lambda_um, [0.532])
     np.testing.assert_array_equal(rules.count, [1, 1, 1])
@@ -235,7 +236,7 @@ def test_a_mirror_keeps_its_lobe() -> None:
 def test_the_spectral_form_answers_every_wavelength_without_integration() -> None:
     """Between all nodes, against sums over samples; the speckle's mean is what errors are held against."""
     field = rough(height=0.08)
-    power = spectrum_of(field, Azimuths(1536), spacing=spectrum.SPACING_OF_A_LINE)
+    power = spectrum_of(field, Azimuths(1536), spacing=power_spectrum.SPACING_OF_A_LINE)
     table = spectral.build(power)
     rng = np.random.default_rng(6)
     rho, phi, share = rng.uniform(0.05, 1.9, 60), rng.uniform(-np.pi, np.pi, 60), rng.uniform(0.1, 1.0, 60)

@@ -106,7 +106,7 @@ def _sheet(bench: Bench, surface: Surface, views: Map, progress: Progress) -> _S
         made = on_elaphe(bench, name) if surface is bench.elaphe else run(name, surface, views)
         methods[name], maps[name] = made.method, made.xyz / unit
         progress(f"methods on {surface.name}", done / len(_ORDER))
-    width = sigma_f(surface.config.coherence.sigma_um) * 1e-3 * surface.config.spectrum.range_nm[1]
+    width = sigma_f(surface.config.coherence.sigma_um) * 1e-3 * surface.config.light.range_nm[1]
     # at least the middle row of pixels
     strip = np.abs(views.views()[:, 1]) < max(_STRIP_WIDTHS * width, 1.0 / views.size)
     maps[_GEMS] = np.where(strip[:, None], maps[_GEMS], 0.0)

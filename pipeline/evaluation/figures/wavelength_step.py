@@ -20,7 +20,7 @@ from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e, pixels
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map, relative_unit
 
@@ -88,7 +88,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
 def _measure(surface: Surface, views: Map, progress: Progress) -> _Steps:
     """|P|^2 once on the finest nodes; every other step's are among them."""
     config, exact = surface.config, reference(surface, progress)
-    rules = {step: trapezoid(config.spectrum, step) for step in (_FINEST_NM, *_STEPS_NM)}
+    rules = {step: trapezoid(config.light, step) for step in (_FINEST_NM, *_STEPS_NM)}
     finest = rules[_FINEST_NM].lambda_nm
     among = {step: np.searchsorted(finest, rule.lambda_nm - 0.5 * _FINEST_NM) for step, rule in rules.items()}
     wi, wr = directions(views, NORMAL)

@@ -10,7 +10,7 @@ from pipeline.config.models import Config
 from pipeline.errors import ConfigError
 from pipeline.optics import colour_data
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
+from pipeline.optics.light import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import dominant_periods
 from pipeline.tables.evaluate import relative_unit
@@ -48,7 +48,7 @@ class Gems:
         no period.
         """
         if spacing_um is None:
-            found = dominant_periods(field, 2e3 / shortest_wavelength_nm(config.spectrum), 1)
+            found = dominant_periods(field, 2e3 / shortest_wavelength_nm(config.light), 1)
             if not found:
                 raise ConfigError(config.name, [("spacing_um", "the surface has no period: give one")])
             spacing_um = found[0].period_um

@@ -8,7 +8,7 @@ from pipeline.diffraction.reference import Reference
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
+from pipeline.optics.light import shortest_wavelength_nm
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import Map, relative_unit, table_evaluator
@@ -30,8 +30,8 @@ class MapTruth:
         self._config, self._unit = config, relative_unit(config)
         self._wr = Map(size, MAP_RADIUS).views()
         self._wi = np.broadcast_to(_NORMAL, self._wr.shape)
-        reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
-        exact = reference.xyz(config.spectrum, config.material, self._wi, self._wr, progress=progress)
+        reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.light), progress)
+        exact = reference.xyz(config.light, config.material, self._wi, self._wr, progress=progress)
         self._exact = exact / self._unit
 
     def error(self, table: PolarTable | TaylorTable) -> ColourError:

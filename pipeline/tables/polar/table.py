@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from kernels import cubic_spline
 from kernels.spectral_operator import RingQuadratures
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import grey
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.spectral_integral import Reflectance
 
@@ -41,7 +41,7 @@ class PolarTable:
 
 
 def build(
-    spectrum: PolarSpectrum,
+    power: PolarPowerSpectrum,
     rings: Rings,
     quadratures: RingQuadratures,
     w_terms: int,
@@ -49,10 +49,10 @@ def build(
 ) -> PolarTable:
     """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
     rho = rings.rho()
-    of = spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um
+    of = power.values, power.radius_per_um, power.s_max_per_um
     samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
     values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
-    return PolarTable(values, PolarGrid(rings, spectrum.azimuths))
+    return PolarTable(values, PolarGrid(rings, power.azimuths))
 
 
 def w_position(rho: Array, w: Array) -> Array:

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import diffraction
-from pipeline.config.models import Scene
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.upload import upload
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
+from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.tables.taylor import grid
 
