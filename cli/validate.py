@@ -101,7 +101,6 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
     """
     from pipeline.config.models import Config
     from pipeline.errors import ConfigError
-    from pipeline.optics.light import LaserLine
 
     found: dict[str, Config] = {}
     for role, path in roles.items():
@@ -111,7 +110,7 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
         if taken is not None:
             fault = f"{config.name!r} is also the name of what stands for {taken}; give this one another"
             raise ConfigError(str(path or role), [("name", fault)])
-        if isinstance(config.light.illuminant, LaserLine):
+        if config.light.is_line:
             fault = f"expected a range of wavelengths, whose colours --bench compares, got a laser line; see --{role}"
             raise ConfigError(str(path), [("spectrum.illuminant", fault)])
         found[role] = config

@@ -22,7 +22,7 @@ from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError
-from pipeline.optics.light import shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress, silent
 from pipeline.tables.evaluate import Evaluator
@@ -73,7 +73,7 @@ def _way_out(reference: MeanReference, config: Config) -> str:
     """What to do about a missed budget: grids follow anything but the sharp edge of what a coarse scan knows."""
     text = 'Raise it, or leave table.rings, azimuths, terms and w_terms on "auto".'
     band = min(reference.fields[0].band_limit_per_um)
-    if band >= plan.rho_max(config.scene) / (1e-3 * shortest_wavelength_nm(config.light)):
+    if band >= plan.rho_max(config.scene) / (1e-3 * config.light.lambda_min_nm):
         return text
     return (
         f"{text} Where light is bright at {band:.3g} per um, where the pitch ends what is known, no table follows "

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
-from pipeline.tables.evaluate import Evaluator, Map, relative_unit, table_evaluator
+from pipeline.tables.evaluate import Evaluator, Map, table_evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
@@ -45,7 +44,7 @@ class CoarseMap:
     """A coarse map under one light, with the truth there."""
 
     def __init__(self, reference: MeanReference, config: Config, light: Array, radius: float) -> None:
-        self.config, self._unit = config, relative_unit(config)
+        self.config, self._unit = config, config.radiometry.unit
         self.wr = Map(_MAP_SIZE, min(MAP_RADIUS, radius)).views()
         self.wi = np.broadcast_to(light, self.wr.shape)
         self._truth = reference.xyz(config.light, config.material, self.wi, self.wr)
@@ -100,9 +99,9 @@ class TaylorStudy:
         return Curve(f"exponent a at {size} nodes", "", powers, errors, self._layout.power)
 
     def _on_grid(self, size: int, power: float) -> float:
-        rule = brdf.integrand_of(self._config)(self._layout.step_nm)
+        rule = self._config.radiometry.integrand(self._layout.step_nm)
         table = taylor.build(self._stack, rule, size, power, self._config.scene)
-        return self._views.error(table_evaluator(table, self._config))
+        return self._views.error(table_evaluator(table, self._config.radiometry))
 
     def _at_views(self, order: int, step_nm: float) -> float:
         """Mean error of a Taylor series of given order and step, at the views themselves."""
@@ -110,7 +109,7 @@ class TaylorStudy:
         plain = trapezoid(self._config.light, step_nm)
 
         def evaluate(wi: Array, wr: Array) -> Array:
-            summed = taylor.at_directions(fewer, brdf.integrand_of(self._config)(step_nm), geometry.uvw(wi, wr))
+            summed = taylor.at_directions(fewer, self._config.radiometry.integrand(step_nm), geometry.uvw(wi, wr))
             return brdf.direction_factor(self._config.material, plain, wi, wr)[:, None] * summed
 
         return self._views.error(evaluate)
@@ -155,7 +154,7 @@ class PolarStudy:
         """Mean error against one wavelength step for all rings; marked is the mean of the steps chosen."""
         light, rho = self._config.light, self._plan.rings.rho()
         steps = [1.0, 2.0, 5.0, 10.0, 20.0]
-        light_of = brdf.illumination_of(self._config)
+        light_of = self._config.radiometry.illumination
         errors = [self._error(self._plan, quadrature.uniform(light_of(s), len(rho))) for s in steps]
         low, high = light.range_nm
         chosen = (high - low) / (float(np.mean(self._rules.count)) - 1.0)
@@ -170,9 +169,9 @@ class PolarStudy:
 
     def _rules_of(self, rho: Array) -> RingQuadratures:
         tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
-        return quadrature.choose(brdf.illumination_of(self._config), rho, self._power.sigma_um, tolerance)
+        return quadrature.choose(self._config.radiometry.illumination, rho, self._power.sigma_um, tolerance)
 
     def _error(self, planned: plan.Plan, rules: RingQuadratures, power: PolarPowerSpectrum | None = None) -> float:
-        reflectance = partial(brdf.spectral_reflectance, self._config.material, self._config.light)
+        reflectance = self._config.radiometry.reflectance
         table = polar.build(power or self._power, planned.rings, rules, planned.w_terms, reflectance)
-        return self._views.error(table_evaluator(table, self._config))
+        return self._views.error(table_evaluator(table, self._config.radiometry))

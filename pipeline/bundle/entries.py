@@ -7,7 +7,7 @@ from typing import Any
 from pipeline.bundle.manifest import Colour, Coverage, Domain, MadeBy, Provenance
 from pipeline.config.models import Config
 from pipeline.optics import validity
-from pipeline.optics.light import LaserLine, shortest_wavelength_nm
+from pipeline.optics.light import LaserLine
 from pipeline.store.digest import of_file
 from pipeline.store.store import Artifact
 from pipeline.surface.statistics import Period
@@ -58,7 +58,7 @@ def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
 def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
     """What the scan's band and the scene leave out."""
     table, band = inputs["table"].summary, inputs["surface"].summary["statistics"]["band_limit_per_um"]
-    known = 1e-3 * shortest_wavelength_nm(config.light) * min(band)
+    known = 1e-3 * config.light.lambda_min_nm * min(band)
     return Coverage(
         unknown_share=table["unknown_share"],
         skipped_share=table["skipped_share"],

@@ -10,7 +10,6 @@ from pipeline.config.models import Config
 from pipeline.optics import fresnel
 from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
-from pipeline.tables.polar.layout import PolarLayout
 from pipeline.validated import Validated
 
 REFLECTANCE = "reflectance.csv"
@@ -97,7 +96,7 @@ def medium(config: Config) -> Medium | None:
     if config.material.fresnel == "dielectric":
         return Medium(None, np.array([config.material.ior], dtype=complex), np.ones(1))
     if config.material.fresnel == "conductor" and not _inside_table(config):
-        quadrature = trapezoid(config.light, config.mean_step_nm)
+        quadrature = trapezoid(config.light, config.table.mean_step_nm)
         index = fresnel.metal_index(config.material.metal, quadrature.lambda_nm)
         return Medium(quadrature.lambda_nm, index, quadrature.weights[:, 1])
     return None
@@ -105,7 +104,7 @@ def medium(config: Config) -> Medium | None:
 
 def _inside_table(config: Config) -> bool:
     """Polar tables hold a metal's reflectance: rho and |w| fix the half angle."""
-    return config.material.fresnel == "conductor" and isinstance(config.table, PolarLayout)
+    return config.material.fresnel == "conductor" and config.table.holds_metals
 
 
 def entry(config: Config) -> MaterialEntry:

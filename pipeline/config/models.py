@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import Coherence
-from pipeline.optics.light import FINE_STEP_NM, Light
+from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.optics.scene import Direction, Lights, Scene
 from pipeline.surface.source import SurfaceSource
@@ -76,9 +77,9 @@ class Config(Validated):
         return DEFAULT_DELTA_E if self.accuracy.delta_e is None else self.accuracy.delta_e
 
     @property
-    def mean_step_nm(self) -> float:
-        """The wavelength step of means that stand outside the spectral integral, such as a metal's luminous mean."""
-        return self.table.step_nm if isinstance(self.table, TaylorLayout) else FINE_STEP_NM
+    def radiometry(self) -> Radiometry:
+        """Light, material and window: all that turns |P|^2 into radiance."""
+        return Radiometry(self.light, self.material, self.coherence.sigma_um, self.table.mean_step_nm)
 
     @model_validator(mode="after")
     def maps_show_the_scene(self) -> Self:

@@ -15,19 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import diffraction
-from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.upload import upload
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent
-from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Evaluator
-from pipeline.tables.polar.layout import PolarLayout
 
 STEP_NM = FINE_STEP_NM
 # in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11
@@ -173,23 +169,6 @@ class MeanReference:
         for field in self.fields[1:]:
             total = total + answer(Reference(field, self._sigma_um, self._lambda_min_nm, self._progress))
         return total / len(self.fields)
-
-
-def reference_of(field: HeightField, config: Config, progress: Progress = silent) -> MeanReference:
-    """The reference of a config: the mean over windows where its table is one, else the middle window's."""
-    fields = windows.places(field, config.coherence) if isinstance(config.table, PolarLayout) else [field]
-    lambda_min = shortest_wavelength_nm(config.light)
-    return MeanReference(fields, config.coherence.sigma_um, lambda_min, progress)
-
-
-def reference_evaluator(field: HeightField, config: Config, progress: Progress = silent) -> Evaluator:
-    """XYZ of pairs of directions by the exact reference under a config's light and material."""
-    reference = reference_of(field, config, progress)
-
-    def evaluate(wi: Array, wr: Array) -> Array:
-        return reference.xyz(config.light, config.material, wi, wr, progress=progress)
-
-    return evaluate
 
 
 def _tiles(count: int) -> Iterator[slice]:

@@ -29,6 +29,16 @@ class Light(Validated):
     observer: str = "CIE 1931 2 Degree Standard Observer"
     range_nm: Pair = (380.0, 780.0)
 
+    @property
+    def is_line(self) -> bool:
+        """Whether it is a laser line."""
+        return isinstance(self.illuminant, LaserLine)
+
+    @property
+    def lambda_min_nm(self) -> float:
+        """The shortest wavelength, nm."""
+        return self.illuminant.lambda_nm if isinstance(self.illuminant, LaserLine) else self.range_nm[0]
+
     @field_validator("range_nm")
     @classmethod
     def visible(cls, value: tuple[float, float]) -> tuple[float, float]:
@@ -82,13 +92,6 @@ class Quadrature:
     @property
     def lambda_min_nm(self) -> float:
         return float(self.lambda_nm[0])
-
-
-def shortest_wavelength_nm(light: Light) -> float:
-    """The shortest wavelength a light asks for, nm."""
-    if isinstance(light.illuminant, LaserLine):
-        return light.illuminant.lambda_nm
-    return light.range_nm[0]
 
 
 def trapezoid(light: Light, step_nm: float) -> Quadrature:

@@ -18,7 +18,7 @@ def check(config: Config, source: str) -> None:
     if config.light == Light() and config.material.metal == "Au":
         return
     try:
-        quadrature = trapezoid(config.light, config.mean_step_nm)
+        quadrature = trapezoid(config.light, config.table.mean_step_nm)
     except BakeError as error:
         raise ConfigError(source, [("spectrum", str(error))]) from None
     try:

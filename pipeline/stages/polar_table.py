@@ -1,18 +1,16 @@
 """Table: power spectrum, light and material -> the polar table of XYZ, with its certificate."""
 
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.accuracy import certificate
+from pipeline.accuracy.exact import reference_of
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
-from pipeline.diffraction.reference import reference_of
 from pipeline.diffraction.upload import kernel_digest
-from pipeline.optics import brdf
 from pipeline.progress import Progress
 from pipeline.stages import power_spectrum, surface
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
@@ -38,16 +36,16 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     power = power_spectrum.load(inputs["power_spectrum"])
     plan = power_spectrum.planned(inputs["power_spectrum"])
-    light = brdf.illumination_of(config)
+    light = config.radiometry.illumination
     budget = power_spectrum.budget(config)
     rules = quadrature.choose(light, plan.rings.rho(), config.coherence.sigma_um, budget.quadrature)
-    reflectance = partial(brdf.spectral_reflectance, config.material, config.light)
+    reflectance = config.radiometry.reflectance
     table = polar.build(power, plan.rings, rules, plan.w_terms, reflectance)
     progress("table", 1.0)
-    unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
+    unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.table.mean_step_nm))
     field = surface.load(inputs["surface"])
     reference = reference_of(field, config)
-    certified = certificate.certify(table_evaluator(table, config), reference, config, progress)
+    certified = certificate.certify(table_evaluator(table, config.radiometry), reference, config, progress)
     spectral = certificate.certify_spectral(power, reference, config)
     arrays.save(
         folder / _FILE,

@@ -12,7 +12,6 @@ from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.upload import kernel_digest
-from pipeline.optics.light import LaserLine
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.stage import Inputs, Stage, Summary
@@ -52,8 +51,8 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _wavelengths(config: Config) -> dict[str, Any]:
     """A line or a range: all of the light that a power spectrum depends on."""
     light = config.light
-    if isinstance(light.illuminant, LaserLine):
-        return light.illuminant.model_dump()
+    if light.is_line:
+        return {"lambda_nm": light.lambda_min_nm}
     return {"range_nm": list(light.range_nm)}
 
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.diffraction.upload import kernel_digest
-from pipeline.optics import brdf
 from pipeline.progress import Progress
 from pipeline.stages import stack
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
@@ -34,7 +33,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     built = stack.load(inputs["stack"])
     section = stack.layout_of(config)
-    quadrature = brdf.integrand_of(config)(section.step_nm)
+    quadrature = config.radiometry.integrand(section.step_nm)
     table = taylor.build(built, quadrature, section.resolution, section.power, config.scene, progress)
     nodes = grid.nodes(table.resolution, table.power)
     arrays.save(

@@ -8,8 +8,9 @@ from typing import Any
 
 from pipeline.accuracy import checks as validation
 from pipeline.accuracy import convergence
+from pipeline.accuracy.exact import reference_of
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference, reference_of
+from pipeline.diffraction.reference import MeanReference
 from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import power_spectrum, render, stack, surface, table
@@ -50,7 +51,7 @@ def _measured(
     """The numbers of the summary, and the pictures by name as `drawing` makes them."""
     field = surface.load(inputs["surface"])
     drawn = {"surface": drawing.submit(_picture, "height_map", field)}
-    evaluate = table_evaluator(table.load(config, inputs["table"]), config)
+    evaluate = table_evaluator(table.load(config, inputs["table"]), config.radiometry)
     reference = reference_of(field, config, progress)
     radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
     first = render.light_direction(config.render.lights[0])

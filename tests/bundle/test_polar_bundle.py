@@ -119,7 +119,7 @@ def test_a_bundle_errs_as_it_says(
     with OpenEXR.File(str(folder / told.tables[-1].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
-    table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar"))
+    table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
     evaluate = bundle_evaluator(folder)
     mirror = wi * [-1.0, -1.0, 1.0]
     for views, error in ((wr, loss_of(told).added), (mirror, loss_of(told).added_in_mirror)):

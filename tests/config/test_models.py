@@ -282,7 +282,7 @@ def test_matching_functions_that_give_no_xyz_are_no_observer(observer):
     """Responses of cones or RGB primaries would be taken for XYZ."""
     assert list(faults(with_section("spectrum", observer=observer))) == ["spectrum.observer"]
     other = with_section("spectrum", observer="CIE 2015 2 Degree Standard Observer")
-    assert parse(other, "f", Path()).spectrum.observer.startswith("CIE 2015")
+    assert parse(other, "f", Path()).light.observer.startswith("CIE 2015")
 
 
 def scene_and_render(scene, render):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.errors import ScanError
-from pipeline.optics.light import LaserLine, Light, illuminant_at, observer_at, shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import LaserLine, Light, illuminant_at, observer_at, trapezoid
 
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
 ILLUMINANTS = ["D65", "A", "E", "FL2", LaserLine(lambda_nm=532.0)]
@@ -52,7 +52,7 @@ def test_laser_line_lies_on_the_spectral_locus(lambda_nm):
     matching = observer_at(OBSERVER, np.array([lambda_nm]))[0]
     assert line.lambda_nm.tolist() == [lambda_nm]
     np.testing.assert_allclose(chromaticity(line), matching[:2] / matching.sum(), rtol=1e-12)
-    assert shortest_wavelength_nm(spectrum) == line.lambda_min_nm == lambda_nm
+    assert spectrum.lambda_min_nm == line.lambda_min_nm == lambda_nm
 
 
 @given(step_nm=st.floats(0.5, 500.0), low=st.floats(360.0, 500.0), width=st.floats(10.0, 300.0))

@@ -1,7 +1,5 @@
 """E(r, phi, s) against sums over samples, and the spectral operator against the reference's integral."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
-from pipeline.optics import brdf
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import LaserLine, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
@@ -159,7 +157,7 @@ def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeyp
     material = Material(fresnel="conductor") if metal else Material()
     rules = quadrature.uniform(trapezoid(LIGHT, 5.0), rings.count)
     of = power.radius_per_um, power.s_max_per_um, rings.rho(), rules
-    nodes, reflectance = power.values.shape[2], partial(brdf.spectral_reflectance, material, LIGHT)
+    nodes, reflectance = power.values.shape[2], Radiometry(LIGHT, material, SIGMA).reflectance
     points = line_points.choose(of[0], nodes, *of[1:])
     assert points.rings.sum() == rings.count
     assert points.rings.max() == 8
@@ -180,7 +178,7 @@ def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeyp
 def test_wavelengths_follow_the_radius() -> None:
     """Near the mirror direction a few, at the rim many; and the estimate bounds what is measured."""
     rho, tolerance = Rings(40, 0.1).rho(), 1e-3
-    light = partial(brdf.integrand, Material(), LIGHT, 16.25)
+    light = Radiometry(LIGHT, Material(), 16.25).integrand
     rules = quadrature.choose(light, rho, 16.25, tolerance)
     assert np.all(np.diff(rules.count) >= 0)
     assert rules.count[0] <= 41
@@ -200,7 +198,7 @@ def test_wavelengths_follow_the_radius() -> None:
 
 def test_every_ring_keeps_the_white() -> None:
     """20 nm alone would miss a hundredth of Z's whole integral, in the mirror direction above all."""
-    light = partial(brdf.integrand, Material(), LIGHT, 16.25)
+    light = Radiometry(LIGHT, Material(), 16.25).integrand
     rules = quadrature.choose(light, Rings(40, 0.1).rho(), 16.25, 1e-3)
     white = light(0.05).weights.sum(axis=0)
     for first, count in zip(rules.first, rules.count, strict=True):
@@ -209,14 +207,14 @@ def test_every_ring_keeps_the_white() -> None:
 
 def test_a_laser_line_needs_one_wavelength() -> None:
     light = Light(illuminant=LaserLine(lambda_nm=532.0))
-    rules = quadrature.choose(partial(brdf.integrand, Material(), light, 16.25), np.arange(3.0), 16.25, 1e-3)
+    rules = quadrature.choose(Radiometry(light, Material(), 16.25).integrand, np.arange(3.0), 16.25, 1e-3)
     np.testing.assert_array_equal(rules.lambda_um, [0.532])
     np.testing.assert_array_equal(rules.count, [1, 1, 1])
 
 
 def test_a_window_too_wide_for_the_finest_step_is_refused() -> None:
-    with pytest.raises(AccuracyError, match="closer than"):
-        quadrature.choose(partial(brdf.integrand, Material(), LIGHT, 300.0), np.array([2.0]), 300.0, 1e-4)
+    with pytest.raises(AccuracyError, match="steps finer than"):
+        quadrature.choose(Radiometry(LIGHT, Material(), 300.0).integrand, np.array([2.0]), 300.0, 1e-4)
 
 
 def test_a_mirror_keeps_its_lobe() -> None:
@@ -230,7 +228,7 @@ def test_a_mirror_keeps_its_lobe() -> None:
     rho, phi = np.linspace(0.0, 0.3, 40), np.linspace(0.0, 6.0, 40)
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
     lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)
-    np.testing.assert_allclose(polar.look_up(table, uvw), lobe @ rule.weights, atol=3e-5)
+    np.testing.assert_allclose(table.look_up(uvw), lobe @ rule.weights, atol=3e-5)
 
 
 def test_the_spectral_form_answers_every_wavelength_without_integration() -> None:

@@ -88,7 +88,7 @@ def test_whole_table_agrees_with_the_reference_in_all_four_quadrants() -> None:
     uv = np.stack([u[u_index], u[v_index]], axis=-1)
     w = -0.9 * np.sqrt(4.0 - np.sum(uv**2, axis=1))
     truth = np.nan_to_num(Reference(field, 2.0, 380.0).power(np.column_stack([uv, w]), quadrature.lambda_nm))
-    found = taylor.look_up(table, np.column_stack([uv, w]))
+    found = table.look_up(np.column_stack([uv, w]))
     np.testing.assert_allclose(found, truth @ quadrature.weights, rtol=1e-4, atol=1e-7)
     assert {(np.sign(a), np.sign(b)) for a, b in uv} >= {(1, 1), (1, -1), (-1, 1), (-1, -1)}
 
@@ -104,7 +104,7 @@ def test_look_up_between_nodes_is_bilinear_in_the_grid_coordinate() -> None:
     w = np.array([-1.1])
     expected = taylor.sum_powers(np.einsum("j,i,jicp->cp", wb, wa, corners)[None], w)
     uvw = np.array([[*grid.node_position(t, 2.0), w[0]]])
-    np.testing.assert_allclose(taylor.look_up(table, uvw), expected, rtol=1e-9)
+    np.testing.assert_allclose(table.look_up(uvw), expected, rtol=1e-9)
 
 
 def test_a_scene_skips_nodes_and_changes_none_it_keeps() -> None:
@@ -119,7 +119,7 @@ def test_a_scene_skips_nodes_and_changes_none_it_keeps() -> None:
     wi = np.array([0.0, np.sin(np.radians(30.0)), np.cos(np.radians(30.0))])
     for theta, reached in ((39.0, True), (60.0, False)):
         wr = np.array([-np.sin(np.radians(theta)), 0.0, np.cos(np.radians(theta))])
-        assert np.all(np.isfinite(taylor.look_up(part, (-wi - wr)[None]))) == reached
+        assert np.all(np.isfinite(part.look_up((-wi - wr)[None]))) == reached
 
 
 def test_what_the_scan_does_not_know_is_counted() -> None:

@@ -28,7 +28,7 @@ from pipeline.progress import Progress
 from pipeline.surface import recipes
 from pipeline.surface.recipes.parameters import Blazed, CompactDisc
 from pipeline.surface.source import SurfaceSource
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 # [S14] fig. 2.13's series; light from the right, so that what the tilt brings into view appears there
 _INCIDENCES: Sequence[Light] = (NORMAL, (10.0, 0.0), (20.0, 0.0), (30.0, 0.0))
@@ -217,7 +217,7 @@ def _pictures(views: Map, shown: Sequence[_Shown], look_up: Array) -> list[Pictu
     from pipeline.evaluation.plots import map_plots
 
     def panel(each: _Shown, xyz: Array, title: str, note: str = "") -> map_plots.Panel:
-        image = views.image(xyz / relative_unit(each.surface.config))
+        image = views.image(xyz / each.surface.config.radiometry.unit)
         return map_plots.Panel(pixels(image, SHOWN_RU), title, note)
 
     def rows(chosen: Sequence[_Shown]) -> list[list[map_plots.Panel]]:

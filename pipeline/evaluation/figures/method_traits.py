@@ -19,7 +19,7 @@ from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 _DIRECTIONS, _SEED = 1000, 20140701
 # of the mirror: a decade below black at 7500 RU
@@ -84,7 +84,7 @@ def lit_share(surface: Surface, method: Method) -> float:
     x, y = np.meshgrid(np.linspace(*_PRIMARY_X, along), np.linspace(-_PRIMARY_Y, _PRIMARY_Y, across))
     wr = np.stack([x.ravel(), y.ravel(), np.sqrt(1.0 - x.ravel() ** 2 - y.ravel() ** 2)], axis=-1)
     wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape).copy()
-    return float(np.mean(lit_views(method.xyz(wi, wr) / relative_unit(surface.config))))
+    return float(np.mean(lit_views(method.xyz(wi, wr) / surface.config.radiometry.unit)))
 
 
 def band_contrast(luminance: Array, views: Map) -> float:

@@ -19,7 +19,7 @@ from pipeline.evaluation.figures.figure import Surface
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.tables.taylor import table as taylor
 
 STEP_NM = PUBLISHED_STEP_NM
@@ -54,7 +54,7 @@ class TaylorSeries:
         """XYZ (directions, 3) of the terms up to `order`."""
         config = self.surface.config
         summed = taylor.at_directions(
-            _cut(self.stack, order), brdf.integrand_of(config)(STEP_NM), geometry.uvw(wi, wr)
+            _cut(self.stack, order), config.radiometry.integrand(STEP_NM), geometry.uvw(wi, wr)
         )
         factor = brdf.direction_factor(config.material, trapezoid(config.light, STEP_NM), wi, wr)
         return np.asarray(factor[:, None] * summed)
@@ -81,7 +81,7 @@ class ChebyshevSeries:
 
 def _stack(surface: Surface, basis: Basis, order: int) -> Stack:
     config = surface.config
-    reachable = 1e3 / shortest_wavelength_nm(config.light)
+    reachable = 1e3 / config.light.lambda_min_nm
     return dft_stack.build(surface.field, basis, order + 1, config.coherence.sigma_um, reachable, _WINDOW_CUT)
 
 

@@ -22,7 +22,7 @@ from pipeline.optics.colour_error import delta_e, pixels
 from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 _STEPS_NM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 _SHOWN_NM = (1.0, 5.0, 10.0, 20.0, 50.0)
@@ -98,9 +98,10 @@ def _measure(surface: Surface, views: Map, progress: Progress) -> _Steps:
         power = exact.power(geometry.uvw(wi[part], wr[part]), finest)
         for step, rule in rules.items():
             seen = power[:, among[step]]
-            xyz[step][part] = integrate(
-                seen, rule, config.material, config.coherence.sigma_um, wi[part], wr[part]
-            ) / relative_unit(config)
+            xyz[step][part] = (
+                integrate(seen, rule, config.material, config.coherence.sigma_um, wi[part], wr[part])
+                / config.radiometry.unit
+            )
         progress("wavelength steps", part.stop / len(wr))
     return _Steps(surface, xyz, lit_views(xyz[_FINEST_NM]))
 

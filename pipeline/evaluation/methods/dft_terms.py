@@ -29,7 +29,6 @@ from pipeline.diffraction import expansion
 from pipeline.diffraction.device import require_device
 from pipeline.optics.coherence import reach_sigmas, sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 
 # of exp(i k w h) at the worst sample: what is left out of the Taylor series where no number of terms is given
@@ -107,7 +106,7 @@ class Lookup:
         Raises DeviceError where no device works.
         """
         require_device()
-        lambda_min = shortest_wavelength_nm(config.light)
+        lambda_min = config.light.lambda_min_nm
         if terms is None:
             z = expansion.largest_phase(field.half_range_um, lambda_min)
             terms = 1 + expansion.taylor_order(z, SERIES_TOLERANCE)

@@ -3,7 +3,6 @@
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 
 
@@ -15,7 +14,7 @@ class Exact:
     def __init__(self, field: HeightField, config: Config) -> None:
         """Raises AccuracyError where the samples do not resolve the window; DeviceError where no device works."""
         self._config = config
-        self._reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.light))
+        self._reference = Reference(field, config.coherence.sigma_um, config.light.lambda_min_nm)
 
     @property
     def stored_bytes(self) -> int:

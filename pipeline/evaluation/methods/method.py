@@ -78,7 +78,7 @@ def monochromatic_brdf(method: Monochromatic, config: Config, wi: Array, wr: Arr
     """
     material, light = config.material, trapezoid(config.light, PUBLISHED_STEP_NM)
     single = Quadrature(lambda_nm, np.ones((len(lambda_nm), 3)))
-    inside = brdf.spectral_reflectance(material, config.light, lambda_nm, geometry.cos_half(wi, wr))
+    inside = config.radiometry.reflectance(lambda_nm, geometry.cos_half(wi, wr))
     inside = inside * brdf.window_area(material, single, config.coherence.sigma_um)
     if material.fresnel == "conductor":
         outside = brdf.geometry_factor(material, wi, wr)

@@ -26,7 +26,7 @@ from pipeline.diffraction.reference import integrate
 from pipeline.errors import ConfigError
 from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach, tiles
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import FINE_STEP_NM, LaserLine, trapezoid
+from pipeline.optics.light import FINE_STEP_NM, trapezoid
 from pipeline.surface.heightfield import HeightField
 
 
@@ -91,7 +91,7 @@ class Nmm:
         `terms`: T + 1 of alg. 1; None takes enough for 1e-6 of exp(i k w h).
         Raises ConfigError for a laser line, which leaves nothing to select, and DeviceError where no device works.
         """
-        if isinstance(config.light.illuminant, LaserLine):
+        if config.light.is_line:
             fault = "expected a spectrum: NMM selects wavelengths from a range, and a laser line has one"
             raise ConfigError(config.name, [("spectrum.illuminant", fault)])
         self._config, self._size_um = config, field.size_um

@@ -10,7 +10,7 @@ from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.reference import in_band
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, integrated
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import Quadrature, shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import Quadrature, trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import table as taylor
 
@@ -66,5 +66,5 @@ def taylor_stack(field: HeightField, config: Config, tolerance: float) -> Stack:
     """
     rule = trapezoid(config.light, PUBLISHED_STEP_NM)
     order = expansion.plan_taylor(field, rule, tolerance).order
-    reachable = expansion.W_MAX / (1e-3 * shortest_wavelength_nm(config.light))
+    reachable = expansion.W_MAX / (1e-3 * config.light.lambda_min_nm)
     return dft_stack.build(field, "taylor", order + 1, config.coherence.sigma_um, reachable, PUBLISHED_CUT)

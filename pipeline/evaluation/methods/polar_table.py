@@ -1,6 +1,6 @@
 """This project's table as a method: polar, planned for the config's error budget."""
 
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -8,7 +8,6 @@ from pipeline.config.models import Config
 from pipeline.diffraction.dft_stack import crop_to_window
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import in_band
-from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
@@ -35,7 +34,7 @@ class PolarTableMethod:
         self._field, self._config = crop_to_window(field, config.coherence.sigma_um).centred(), config
         self._layout = config.table if isinstance(config.table, PolarLayout) else PolarLayout()
         self._table = self._integrated(*self._planned(self._layout))
-        self._look_up = table_evaluator(self._table, config)
+        self._look_up = table_evaluator(self._table, config.radiometry)
 
     @property
     def stored_bytes(self) -> int:
@@ -72,7 +71,7 @@ class PolarTableMethod:
 
     def _integrated(self, made: PolarPowerSpectrum, chosen: Plan) -> PolarTable:
         config, rho = self._config, chosen.rings.rho()
-        light, sigma_um = brdf.illumination_of(config), config.coherence.sigma_um
+        light, sigma_um = config.radiometry.illumination, config.coherence.sigma_um
         rules = quadrature.choose(light, rho, sigma_um, self._budget.quadrature)
-        reflectance = partial(brdf.spectral_reflectance, config.material, config.light)
+        reflectance = config.radiometry.reflectance
         return polar.build(made, chosen.rings, rules, chosen.w_terms, reflectance)

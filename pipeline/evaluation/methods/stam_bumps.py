@@ -28,7 +28,7 @@ from pipeline.diffraction.reference import STEP_NM, integrate
 from pipeline.errors import ConfigError
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import dominant_periods
 
@@ -128,7 +128,7 @@ class StamBumps:
         """
         if not 0.0 < epsilon <= 0.5:
             raise ConfigError(config.name, [("epsilon", f"expected 0 < epsilon <= 0.5, got {epsilon:g}")])
-        self._config, self._lambda_min_nm = config, shortest_wavelength_nm(config.light)
+        self._config, self._lambda_min_nm = config, config.light.lambda_min_nm
         if periods_um is None:
             if field.half_range_um == 0.0:
                 raise ConfigError(config.name, [("periods_um", "a flat surface has no period: give them")])

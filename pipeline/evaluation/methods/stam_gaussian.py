@@ -30,7 +30,6 @@ from pipeline.diffraction import expansion
 from pipeline.evaluation.methods.method import integrated
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 
 # [D14] sec. 6.3: the circular aperture of 100 um before the laser
@@ -213,7 +212,7 @@ class StamGaussian:
     def __init__(self, field: HeightField, config: Config, window: Window | None = None) -> None:
         """The coherence window of the config unless another is given, such as the text's `DiscWindow()`."""
         self._window = GaussianWindow(config.coherence.sigma_um) if window is None else window
-        lambda_min = shortest_wavelength_nm(config.light)
+        lambda_min = config.light.lambda_min_nm
         self._surface = GaussianSurface(autocovariance(field), field.pitch_um, self._window, lambda_min)
         # `absolute` multiplies by the window's area
         coherence = config.coherence.model_copy(update={"sigma_um": self._window.sigma_um})

@@ -10,9 +10,8 @@ from pipeline.diffraction import dft_stack, expansion
 from pipeline.evaluation.speed import plain, work
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.timing import best_of, timed
-from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import Quadrature, shortest_wavelength_nm
+from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import grid
 from pipeline.tables.taylor import table as taylor
@@ -44,7 +43,7 @@ class Paper:
     def __init__(self, field: HeightField, config: Config, repeats: int) -> None:
         self._config = config
         plan = expansion.plan_taylor(field, self._quadrature(STEP_NM), _TOLERANCE)
-        reachable = expansion.W_MAX / (1e-3 * shortest_wavelength_nm(config.light))
+        reachable = expansion.W_MAX / (1e-3 * config.light.lambda_min_nm)
 
         def build() -> dft_stack.Stack:
             cut = dft_stack.window_tolerance(_TOLERANCE)
@@ -81,7 +80,7 @@ class Paper:
 
     def _quadrature(self, step_nm: float) -> Quadrature:
         config = self._config
-        return brdf.integrand_of(config)(step_nm)
+        return config.radiometry.integrand(step_nm)
 
 
 def _some_nodes(count: int) -> Array:

@@ -12,7 +12,6 @@ from pipeline.evaluation.speed import work
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of, timed
-from pipeline.optics.light import LaserLine
 from pipeline.tables.polar.table import PolarTable
 
 SECOND_ILLUMINANT = "A"
@@ -76,7 +75,7 @@ def _once(setting: Setting) -> tuple[Stack, PolarPowerSpectrum, PolarTable, Stag
 
 
 def _second_light(setting: Setting, made: PolarPowerSpectrum, repeats: int) -> float | None:
-    if isinstance(setting.light.illuminant, LaserLine):
+    if setting.light.is_line:
         return None
     other = setting.light.model_copy(update={"illuminant": SECOND_ILLUMINANT})
     return best_of(repeats, lambda: setting.table(made, other))[1]

@@ -1,7 +1,7 @@
 """A polar table to be timed: everything that its stages are given, and the same table's integral in other hands."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -13,9 +13,9 @@ from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack, crop_to_window
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
-from pipeline.optics import brdf
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import LaserLine, Light, Quadrature, shortest_wavelength_nm
+from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.planning import plan
 from pipeline.tables.planning.plan import Budget, Plan
@@ -50,7 +50,7 @@ class Setting:
 
     @property
     def lambda_min_nm(self) -> float:
-        return shortest_wavelength_nm(self.light)
+        return self.light.lambda_min_nm
 
     @property
     def r_max_per_um(self) -> float:
@@ -59,7 +59,7 @@ class Setting:
     @cached_property
     def radius_per_um(self) -> Array:
         """The radii of E."""
-        line = isinstance(self.light.illuminant, LaserLine)
+        line = self.light.is_line
         spacing = power_spectrum.SPACING_OF_A_LINE if line else power_spectrum.SPACING
         return power_spectrum.radii(self.sigma_um, self.r_max_per_um, spacing)
 
@@ -78,7 +78,7 @@ class Setting:
         return self.rules_of(self.light)
 
     def rules_of(self, light: Light) -> RingQuadratures:
-        lit = partial(brdf.illumination, self.config.material, light, self.sigma_um)
+        lit = Radiometry(light, self.config.material, self.sigma_um).illumination
         return quadrature.choose(lit, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
 
     @cached_property
@@ -88,13 +88,13 @@ class Setting:
         return line_points.choose(self.radius_per_um, self.plan.s_nodes, s_max, rho, self.rules)
 
     def table(self, made: PolarPowerSpectrum, light: Light) -> polar.PolarTable:
-        reflectance = partial(brdf.spectral_reflectance, self.config.material, light)
+        reflectance = Radiometry(light, self.config.material, self.sigma_um).reflectance
         return polar.build(made, self.plan.rings, self.rules_of(light), self.plan.w_terms, reflectance)
 
     def samples(self, made: PolarPowerSpectrum) -> NDArray[np.float64]:
         """The table's samples (rings, 3, w nodes, azimuths) before splines are put through them."""
         of = made.values, made.radius_per_um, made.s_max_per_um, self.plan.rings.rho(), self.rules
-        reflectance = partial(brdf.spectral_reflectance, self.config.material, self.light)
+        reflectance = Radiometry(self.light, self.config.material, self.sigma_um).reflectance
         terms = spectral_integral.integrate(*of, self.plan.w_terms, reflectance)
         # T_k at the nodes of w, (w node, k)
         x = 2.0 * w_nodes(self.plan.w_terms) - 1.0
@@ -109,7 +109,7 @@ class Setting:
     @cached_property
     def _reflectance(self) -> NDArray[np.float32]:
         """What of R stays inside the integral, (wavelengths of all rings, w nodes)."""
-        reflectance = partial(brdf.spectral_reflectance, self.config.material, self.light)
+        reflectance = Radiometry(self.light, self.config.material, self.sigma_um).reflectance
         return spectral_integral.at_nodes(reflectance, self.plan.rings.rho(), self._w, self.rules)
 
     def rule_of_ring(self, ring: int) -> Quadrature:

@@ -6,8 +6,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from pipeline.accuracy.exact import reference_evaluator
 from pipeline.config.models import Accuracy, Config
-from pipeline.diffraction.reference import reference_evaluator
 from pipeline.evaluation.stability.cell import SEED, Cell
 from pipeline.evaluation.stability.reading import NO_DIGITS
 from pipeline.optics import geometry
@@ -48,7 +48,7 @@ def table_error(cell: Cell, field: HeightField) -> float:
         made = run.execute(config, run.plan(config, store, "table"), store)
         baked = table.load(config, store.open("table", made["table"].key))
         field = surface.load(store.open("surface", made["surface"].key))
-    evaluate = table_evaluator(baked, config)
+    evaluate = table_evaluator(baked, config.radiometry)
     wi, wr = random_pairs(None, 1000, SEED)
     found = evaluate(wi, wr)
     if not (np.all(np.isfinite(found)) and np.all(np.isfinite(evaluate(*_extreme_pairs())))):

@@ -1,16 +1,15 @@
 """What polar tables of every grid are made of: a stack, and the nodes, terms and light that all of them share."""
 
 from dataclasses import dataclass
-from functools import partial
 
 from kernels.spectral_operator import RingQuadratures
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
-from pipeline.optics import brdf
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
@@ -35,7 +34,7 @@ class Ingredients:
 
     @property
     def is_line(self) -> bool:
-        return isinstance(self.light.illuminant, LaserLine)
+        return self.light.is_line
 
     def power_spectrum(self, azimuths: Azimuths) -> PolarPowerSpectrum:
         """E on these azimuths."""
@@ -43,7 +42,7 @@ class Ingredients:
 
     def rules(self, rho: Array) -> RingQuadratures:
         """Wavelengths of every ring."""
-        light = partial(brdf.integrand, Material(), self.light, self.stack.sigma_um)
+        light = Radiometry(self.light, Material(), self.stack.sigma_um).integrand
         return quadrature.choose(light, rho, self.stack.sigma_um, self.quadrature_error)
 
     def table(self, made: PolarPowerSpectrum, rings: Rings) -> PolarTable:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, Rings
-from pipeline.optics.light import LaserLine, Light, shortest_wavelength_nm
+from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
@@ -80,13 +80,13 @@ def make(
     light only its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of reach or E
     would not fit into memory.
     """
-    lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
+    lambda_min, outer = light.lambda_min_nm, rho_max(scene)
     z = expansion.largest_phase(max(field.half_range_um for field in fields), lambda_min)
     amplitude = AMPLITUDE_SHARE * budget.delta_e
     terms = expansion.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
     nodes = expansion.chebyshev_order(power_spectrum.S_REACH * z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
     light = _probing_light(light, layout)
-    line = isinstance(light.illuminant, LaserLine)
+    line = light.is_line
     spacing = power_spectrum.SPACING_OF_A_LINE if line else power_spectrum.SPACING
     radius = power_spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
     built = power_spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
@@ -104,13 +104,13 @@ def make(
 
 def _w_terms(phase: float, light: Light, budget: Budget) -> int:
     """Terms in |w|, in fours, for k |w| H at the luminous middle: white light's blue end hardly counts."""
-    share = _W_SHARE_OF_A_LINE if isinstance(light.illuminant, LaserLine) else _W_SHARE
+    share = _W_SHARE_OF_A_LINE if light.is_line else _W_SHARE
     return 4 * ceil((expansion.chebyshev_order(phase, share * min(0.1, budget.delta_e)) + 1) / 4)
 
 
 def _probing_light(light: Light, layout: PolarLayout) -> Light:
     """What the grid is planned under: E serves every illuminant of a range, so equal energy, or else one line."""
-    if isinstance(light.illuminant, LaserLine):
+    if light.is_line:
         return light
     if layout.form == "spectral":
         return Light(illuminant=LaserLine(lambda_nm=_middle_nm(light)))
@@ -119,6 +119,6 @@ def _probing_light(light: Light, layout: PolarLayout) -> Light:
 
 def _middle_nm(light: Light) -> float:
     """The wavelength of a light that the eye weighs most."""
-    if isinstance(light.illuminant, LaserLine):
-        return light.illuminant.lambda_nm
+    if light.is_line:
+        return light.lambda_min_nm
     return float(np.clip(_LUMINOUS_NM, *light.range_nm))

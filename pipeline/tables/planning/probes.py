@@ -49,7 +49,7 @@ class Probes:
 
     def error(self, table: polar.PolarTable) -> float:
         """Mean CIELAB error of a table."""
-        found = np.nan_to_num(polar.look_up(table, self._uvw))
+        found = np.nan_to_num(table.look_up(self._uvw))
         error = delta_e(self._factor * found, self._factor * self._exact, self._exposure_ru)
         return float(np.average(error, weights=self._counts))
 

@@ -1,6 +1,6 @@
 """The settings of the paper's table."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -10,6 +10,10 @@ from pipeline.validated import Validated
 
 class TaylorLayout(Validated):
     """The paper's table: I_p on `resolution` x `resolution` nodes 2 |t|^power sign(t)."""
+
+    averages_windows: ClassVar[bool] = False
+    holds_metals: ClassVar[bool] = False
+    compresses: ClassVar[bool] = False
 
     layout: Literal["taylor"]
     resolution: Annotated[int, Field(ge=3, le=4001)] = 501
@@ -24,3 +28,8 @@ class TaylorLayout(Validated):
         if value % 2 == 0:
             raise ValueError(f"expected an odd number, so that (u, v) = (0, 0) is a node, got {value}")
         return value
+
+    @property
+    def mean_step_nm(self) -> float:
+        """Step, nm, of the means over wavelength that are taken outside the spectral integral: the integral's own."""
+        return self.step_nm

@@ -15,7 +15,6 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
 from pipeline.surface.recipes.parameters import Blazed, Mirror
 from pipeline.surface.source import SurfaceSource
-from pipeline.tables.evaluate import relative_unit
 
 FLAT = HeightField(np.zeros((16, 16)), (0.1, 0.1))
 SETTINGS = Config(name="test", surface=SurfaceSource(recipe=Mirror(kind="mirror")))
@@ -78,7 +77,7 @@ def test_the_display_shows_the_shaders_own_colours(normalisation: str) -> None:
     settings = SETTINGS.model_copy(update={"material": Material(normalisation=normalisation)})
     wi, wr = views_at(np.array([0.0, 0.41]))
     method = Gems(FLAT, settings, 1.5)
-    shown = displayed_srgb(method.xyz(wi, wr) / relative_unit(settings), settings.render.exposure_ru)
+    shown = displayed_srgb(method.xyz(wi, wr) / settings.radiometry.unit, settings.render.exposure_ru)
     np.testing.assert_allclose(shown, np.clip(method.rgb(wi, wr), 0.0, 1.0), atol=2e-4)
     np.testing.assert_allclose(shown[0], 1.0, atol=2e-4)
 

@@ -18,7 +18,7 @@ from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Mirror
 from pipeline.surface.source import SurfaceSource
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 from pipeline.tables.polar.layout import PolarLayout
 
 SIGMA_UM = 2.5
@@ -70,7 +70,7 @@ def test_the_table_keeps_its_budget(fresnel: str) -> None:
     settings = config_of(material=Material(fresnel=fresnel))
     table, wr = PolarTableMethod(rough(), settings), Map(41, 0.98).views()
     wi = np.broadcast_to(geometry.direction(0.3, 0.4), wr.shape)
-    unit = relative_unit(settings)
+    unit = settings.radiometry.unit
     error = delta_e(table.xyz(wi, wr) / unit, Exact(rough(), settings).xyz(wi, wr) / unit, 7500.0)
     assert 0.0 < float(np.mean(error)) < 0.2
 
