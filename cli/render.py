@@ -33,20 +33,20 @@ def render_command(
     A map shows every view of one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files go
     to OUT/NAME as EXR (linear XYZ, 1 RU) and PNG.
     """
-    from pipeline.config.models import Direction
     from pipeline.optics.colour_error import pixels
+    from pipeline.optics.scene import Direction
     from pipeline.report import images
     from pipeline.stages import render
     from pipeline.store import scratch
     from pipeline.store.store import writing
-    from pipeline.tables.evaluate import Map, relative_unit, render_map
+    from pipeline.tables.evaluate import Map, render_map
 
     if theta is None and phi is not None:
         raise click.UsageError("--phi turns a light given by --theta; name both")
     config = sources.load(config_path)
     lights = config.render.lights if theta is None else [Direction(theta_deg=theta, phi_deg=phi or 0.0)]
     views = Map(size or config.render.size, render.map_radius(config))
-    folder, unit, made = out / config.name, relative_unit(config), []
+    folder, unit, made = out / config.name, config.radiometry.unit, []
     with console.showing_progress() as progress:
         evaluate = sources.config_evaluator(config, exact, store_root, progress)
         shown = [render_map(evaluate, render.light_direction(light), views) for light in lights]

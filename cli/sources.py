@@ -38,14 +38,14 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
     artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
     artifact = store.open(until, artifacts[until].key)
     if exact:
-        from pipeline.diffraction.reference import reference_evaluator
+        from pipeline.accuracy.exact import reference_evaluator
         from pipeline.stages import surface
 
         return reference_evaluator(surface.load(artifact), config, progress)
     from pipeline.stages import table
     from pipeline.tables.evaluate import table_evaluator
 
-    return table_evaluator(table.load(config, artifact), config, progress)
+    return table_evaluator(table.load(config, artifact), config.radiometry, progress)
 
 
 def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
@@ -55,19 +55,19 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
     config = load(source)
     if not exact and getattr(config.table, "form", None) != "spectral":
         raise click.UsageError('--wavelengths needs table.form = "spectral" in the config, or --exact')
-    from pipeline.diffraction.reference import reference_of
+    from pipeline.accuracy.exact import reference_of
     from pipeline.optics.geometry import uvw
-    from pipeline.stages import run, spectrum, surface
+    from pipeline.stages import power_spectrum, run, surface
     from pipeline.tables.polar import spectral
 
     store = console.open_store(store_root)
-    until = "surface" if exact else "spectrum"
+    until = "surface" if exact else "power_spectrum"
     artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
     artifact = store.open(until, artifacts[until].key)
     if exact:
         reference = reference_of(surface.load(artifact), config, progress)
         return lambda wi, wr, lambda_nm: reference.power(uvw(wi, wr), lambda_nm)
-    table = spectral.build(spectrum.load(artifact))
+    table = spectral.build(power_spectrum.load(artifact))
     return lambda wi, wr, lambda_nm: spectral.look_up(table, uvw(wi, wr), lambda_nm)
 
 

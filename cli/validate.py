@@ -99,7 +99,7 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
 
     Raises ConfigError for two of one name, which no page could tell apart, and for a laser line.
     """
-    from pipeline.config.models import Config, LaserLine
+    from pipeline.config.models import Config
     from pipeline.errors import ConfigError
 
     found: dict[str, Config] = {}
@@ -110,7 +110,7 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
         if taken is not None:
             fault = f"{config.name!r} is also the name of what stands for {taken}; give this one another"
             raise ConfigError(str(path or role), [("name", fault)])
-        if isinstance(config.spectrum.illuminant, LaserLine):
+        if config.light.is_line:
             fault = f"expected a range of wavelengths, whose colours --bench compares, got a laser line; see --{role}"
             raise ConfigError(str(path), [("spectrum.illuminant", fault)])
         found[role] = config

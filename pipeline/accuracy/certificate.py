@@ -16,18 +16,19 @@ from pipeline.accuracy.checks import (
     check_reference,
     relative_error,
 )
-from pipeline.config.models import Config, PolarLayout
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.config.models import Config
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.tables.evaluate import Evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.polar import spectral
+from pipeline.tables.polar.layout import PolarLayout
 
 _SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
@@ -72,7 +73,7 @@ def _way_out(reference: MeanReference, config: Config) -> str:
     """What to do about a missed budget: grids follow anything but the sharp edge of what a coarse scan knows."""
     text = 'Raise it, or leave table.rings, azimuths, terms and w_terms on "auto".'
     band = min(reference.fields[0].band_limit_per_um)
-    if band >= plan.rho_max(config.scene) / (1e-3 * shortest_wavelength_nm(config.spectrum)):
+    if band >= plan.rho_max(config.scene) / (1e-3 * config.light.lambda_min_nm):
         return text
     return (
         f"{text} Where light is bright at {band:.3g} per um, where the pitch ends what is known, no table follows "
@@ -80,13 +81,13 @@ def _way_out(reference: MeanReference, config: Config) -> str:
     )
 
 
-def certify_spectral(power: PolarSpectrum, reference: MeanReference, config: Config) -> RelativeError | None:
+def certify_spectral(power: PolarPowerSpectrum, reference: MeanReference, config: Config) -> RelativeError | None:
     """Errors of I_lambda on random directions, where a config asks for the spectral form: else nothing to say."""
     if not isinstance(config.table, PolarLayout) or config.table.form != "spectral":
         return None
     wi, wr = random_pairs(config.scene, _SPECTRAL_DIRECTIONS, _SEED)
     uvw = geometry.uvw(wi, wr)
-    wavelengths = trapezoid(config.spectrum, _SPECTRAL_STEP_NM).lambda_nm
+    wavelengths = trapezoid(config.light, _SPECTRAL_STEP_NM).lambda_nm
     exact = np.nan_to_num(reference.power(uvw, wavelengths))
     return relative_error(spectral.look_up(spectral.build(power), uvw, wavelengths), exact, MIRROR_FLOOR)
 

@@ -9,14 +9,14 @@ import numpy as np
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference, Reference, power_direct
 from pipeline.errors import AccuracyError
-from pipeline.optics import brdf, geometry
+from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError, colour_errors, delta_e
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Evaluator, Map, relative_unit
+from pipeline.tables.evaluate import Evaluator, Map
 
 # the map over which this project states colour errors: 301 x 301 inside radius 0.98
 MAP_SIZE, MAP_RADIUS = 301, 0.98
@@ -43,15 +43,8 @@ def relative_error(values: Array, reference: Array, floor: float) -> RelativeErr
     return RelativeError(float(np.median(error)), float(np.percentile(error, 99)), float(error.max()))
 
 
-def mirror_luminance(config: Config, wi: Array, wr: Array) -> Array:
-    """Y (directions,) that |P|^2 = 1 at every wavelength would give at these directions."""
-    plain = trapezoid(config.spectrum, config.mean_step_nm)
-    inside = brdf.integrand_of(config)(config.mean_step_nm).weights[:, 1].sum()
-    return brdf.direction_factor(config.material, plain, wi, wr) * float(inside)
-
-
 def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourError]:
-    unit = relative_unit(config)
+    unit = config.radiometry.unit
     return colour_errors(found / unit, truth / unit, config.accuracy.exposure_ru)
 
 
@@ -69,10 +62,10 @@ def check_random(
 ) -> RandomCheck:
     """The table (`evaluate`) against the reference on directions it was not made for."""
     wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
-    truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
+    truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
     # over a mirror's Y what is left is |P|^2
-    mirror = mirror_luminance(config, wi, wr)
+    mirror = config.radiometry.mirror_luminance(wi, wr)
     power = relative_error(found[:, 1] / mirror, truth[:, 1] / mirror, MIRROR_FLOOR)
     return RandomCheck(len(wi), power, _colour_errors(config, found, truth))
 
@@ -103,9 +96,9 @@ def check_map(
     views = Map(MAP_SIZE, min(MAP_RADIUS, radius))
     wr = views.views()
     wi = np.broadcast_to(light, wr.shape)
-    truth = reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
+    truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
-    unit, errors = relative_unit(config), _colour_errors(config, found, truth)
+    unit, errors = config.radiometry.unit, _colour_errors(config, found, truth)
     return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors)
 
 
@@ -117,7 +110,7 @@ def check_reference(field: HeightField, reference: Reference, config: Config, di
     wi, wr = random_pairs(config.scene, directions, _SEED + 1)
     # the mirror direction is within every scan's band
     uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -1.5]]])
-    nodes = trapezoid(config.spectrum, 100.0).lambda_nm
+    nodes = trapezoid(config.light, 100.0).lambda_nm
     direction = np.arange(len(uvw))
     node = direction % len(nodes)
     direct = _direct_sums(field, config.coherence.sigma_um, uvw, nodes[node])

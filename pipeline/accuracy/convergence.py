@@ -2,26 +2,26 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from pipeline.accuracy.checks import MAP_RADIUS
-from pipeline.config.models import Config, TaylorLayout
+from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.polar_grid import TILE
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import STEP_NM, MeanReference
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
-from pipeline.tables.evaluate import Evaluator, Map, relative_unit, table_evaluator
+from pipeline.optics.light import trapezoid
+from pipeline.tables.evaluate import Evaluator, Map, table_evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.quadrature import RingQuadratures
 from pipeline.tables.taylor import table as taylor
+from pipeline.tables.taylor.layout import TaylorLayout
 
 _MAP_SIZE = 61
 
@@ -44,10 +44,10 @@ class CoarseMap:
     """A coarse map under one light, with the truth there."""
 
     def __init__(self, reference: MeanReference, config: Config, light: Array, radius: float) -> None:
-        self.config, self._unit = config, relative_unit(config)
+        self.config, self._unit = config, config.radiometry.unit
         self.wr = Map(_MAP_SIZE, min(MAP_RADIUS, radius)).views()
         self.wi = np.broadcast_to(light, self.wr.shape)
-        self._truth = reference.xyz(config.spectrum, config.material, self.wi, self.wr)
+        self._truth = reference.xyz(config.light, config.material, self.wi, self.wr)
 
     def error(self, evaluate: Evaluator) -> float:
         """Mean CIELAB error of an evaluator."""
@@ -99,17 +99,17 @@ class TaylorStudy:
         return Curve(f"exponent a at {size} nodes", "", powers, errors, self._layout.power)
 
     def _on_grid(self, size: int, power: float) -> float:
-        rule = brdf.integrand_of(self._config)(self._layout.step_nm)
+        rule = self._config.radiometry.integrand(self._layout.step_nm)
         table = taylor.build(self._stack, rule, size, power, self._config.scene)
-        return self._views.error(table_evaluator(table, self._config))
+        return self._views.error(table_evaluator(table, self._config.radiometry))
 
     def _at_views(self, order: int, step_nm: float) -> float:
         """Mean error of a Taylor series of given order and step, at the views themselves."""
         fewer = replace(self._stack, coefficients=self._stack.coefficients[..., : order + 1])
-        plain = trapezoid(self._config.spectrum, step_nm)
+        plain = trapezoid(self._config.light, step_nm)
 
         def evaluate(wi: Array, wr: Array) -> Array:
-            summed = taylor.at_directions(fewer, brdf.integrand_of(self._config)(step_nm), geometry.uvw(wi, wr))
+            summed = taylor.at_directions(fewer, self._config.radiometry.integrand(step_nm), geometry.uvw(wi, wr))
             return brdf.direction_factor(self._config.material, plain, wi, wr)[:, None] * summed
 
         return self._views.error(evaluate)
@@ -118,8 +118,8 @@ class TaylorStudy:
 class PolarStudy:
     """Rings, azimuths, terms in |w| and wavelength step of the polar table, everything else as planned."""
 
-    def __init__(self, spectrum: PolarSpectrum, planned: plan.Plan, chosen: Evaluator, views: CoarseMap) -> None:
-        self._spectrum, self._plan, self._views = spectrum, planned, views
+    def __init__(self, power: PolarPowerSpectrum, planned: plan.Plan, chosen: Evaluator, views: CoarseMap) -> None:
+        self._power, self._plan, self._views = power, planned, views
         self._config = views.config
         self._chosen = views.error(chosen)
         self._rules = self._rules_of(planned.rings.rho())
@@ -139,7 +139,7 @@ class PolarStudy:
         """Mean error against the number of azimuths: every eighth, fourth, second and all."""
         chosen = self._plan.azimuths.count
         skips = [skip for skip in (8, 4, 2) if chosen % (skip * TILE) == 0]
-        errors = [self._error(self._plan, self._rules, self._spectrum.thinned(skip)) for skip in skips]
+        errors = [self._error(self._plan, self._rules, self._power.thinned(skip)) for skip in skips]
         counts = [float(chosen // skip) for skip in (*skips, 1)]
         return Curve("azimuths", "", counts, [*errors, self._chosen], float(chosen))
 
@@ -152,9 +152,9 @@ class PolarStudy:
 
     def step(self) -> Curve:
         """Mean error against one wavelength step for all rings; marked is the mean of the steps chosen."""
-        light, rho = self._config.spectrum, self._plan.rings.rho()
+        light, rho = self._config.light, self._plan.rings.rho()
         steps = [1.0, 2.0, 5.0, 10.0, 20.0]
-        light_of = brdf.illumination_of(self._config)
+        light_of = self._config.radiometry.illumination
         errors = [self._error(self._plan, quadrature.uniform(light_of(s), len(rho))) for s in steps]
         low, high = light.range_nm
         chosen = (high - low) / (float(np.mean(self._rules.count)) - 1.0)
@@ -169,9 +169,9 @@ class PolarStudy:
 
     def _rules_of(self, rho: Array) -> RingQuadratures:
         tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
-        return quadrature.choose(brdf.illumination_of(self._config), rho, self._spectrum.sigma_um, tolerance)
+        return quadrature.choose(self._config.radiometry.illumination, rho, self._power.sigma_um, tolerance)
 
-    def _error(self, planned: plan.Plan, rules: RingQuadratures, spectrum: PolarSpectrum | None = None) -> float:
-        reflectance = partial(brdf.spectral_reflectance, self._config.material, self._config.spectrum)
-        table = polar.build(spectrum or self._spectrum, planned.rings, rules, planned.w_terms, reflectance)
-        return self._views.error(table_evaluator(table, self._config))
+    def _error(self, planned: plan.Plan, rules: RingQuadratures, power: PolarPowerSpectrum | None = None) -> float:
+        reflectance = self._config.radiometry.reflectance
+        table = polar.build(power or self._power, planned.rings, rules, planned.w_terms, reflectance)
+        return self._views.error(table_evaluator(table, self._config.radiometry))

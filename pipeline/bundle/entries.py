@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.bundle.manifest import Colour, Coverage, Domain, MadeBy, Provenance
-from pipeline.config.models import Config, LaserLine, TaylorLayout
+from pipeline.config.models import Config
 from pipeline.optics import validity
-from pipeline.optics.spectra import shortest_wavelength_nm
+from pipeline.optics.light import LaserLine
 from pipeline.store.digest import of_file
 from pipeline.store.store import Artifact
 from pipeline.surface.statistics import Period
 from pipeline.tables.taylor import grid
+from pipeline.tables.taylor.layout import TaylorLayout
 
 _NOT_RECORDED = "not recorded"
 _LUMINOUS_NM = 550.0
@@ -46,9 +47,9 @@ def units(config: Config, table: str) -> dict[str, str]:
 def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
     """Light and observer."""
     return Colour(
-        observer=config.spectrum.observer,
+        observer=config.light.observer,
         illuminant=_illuminant(config),
-        range_nm=list(config.spectrum.range_nm),
+        range_nm=list(config.light.range_nm),
         step_nm=config.table.step_nm if isinstance(config.table, TaylorLayout) else None,
         wavelengths=inputs["table"].summary["wavelengths"],
     )
@@ -57,7 +58,7 @@ def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
 def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
     """What the scan's band and the scene leave out."""
     table, band = inputs["table"].summary, inputs["surface"].summary["statistics"]["band_limit_per_um"]
-    known = 1e-3 * shortest_wavelength_nm(config.spectrum) * min(band)
+    known = 1e-3 * config.light.lambda_min_nm * min(band)
     return Coverage(
         unknown_share=table["unknown_share"],
         skipped_share=table["skipped_share"],
@@ -68,7 +69,7 @@ def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
 
 def domain(config: Config, inputs: Mapping[str, Artifact]) -> Domain:
     """Where the surface lies in the scalar model's domain, at the light's line or the eye's middle wavelength."""
-    illuminant = config.spectrum.illuminant
+    illuminant = config.light.illuminant
     lambda_nm = illuminant.lambda_nm if isinstance(illuminant, LaserLine) else _LUMINOUS_NM
     statistics = inputs["surface"].summary["statistics"]
     periods = [Period(**period) for period in statistics["periods"]]
@@ -111,7 +112,7 @@ def _resolved(config: Config) -> dict[str, Any]:
 
 
 def _illuminant(config: Config) -> dict[str, Any]:
-    illuminant = config.spectrum.illuminant
+    illuminant = config.light.illuminant
     return _file_or_name(illuminant) if isinstance(illuminant, str) else illuminant.model_dump()
 
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 from pipeline.bundle import polar, taylor
 from pipeline.bundle.prepared import Prepared
-from pipeline.config.models import Config, PolarLayout
+from pipeline.config.models import Config
 from pipeline.store.store import Artifact
+from pipeline.tables.polar.layout import PolarLayout
 
 
 def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:

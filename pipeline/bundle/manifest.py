@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from pipeline.bundle.material import MaterialEntry
-from pipeline.config.models import Section
+from pipeline.validated import Validated
 
 MANIFEST = "manifest.json"
 SCHEMA_VERSION: Literal[3] = 3
@@ -18,7 +18,7 @@ Normal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # --- images --------------------------------------------------------------------------------------------
 
 
-class Image(Section):
+class Image(Validated):
     """An EXR of the bundle; row 0 is its first line."""
 
     file: Annotated[str, Field(pattern=r"^(tables|maps)/[A-Za-z0-9_.+-]+\.exr$")]
@@ -61,7 +61,7 @@ class MapImage(Image):
 # --- grids ---------------------------------------------------------------------------------------------
 
 
-class TaylorGrid(Section):
+class TaylorGrid(Validated):
     """Where the texels of a Taylor table stand in (u, v)."""
 
     layout: Literal["taylor"]
@@ -79,7 +79,7 @@ class TaylorGrid(Section):
     )
 
 
-class PolarGrid(Section):
+class PolarGrid(Validated):
     """Where the texels of a polar table stand in (u, v), and what is made of them.
 
     basis: (outputs, 3, w_terms); None where every output is a term of its own.
@@ -131,7 +131,7 @@ Grid = Annotated[TaylorGrid | PolarGrid, Field(discriminator="layout")]
 # --- errors --------------------------------------------------------------------------------------------
 
 
-class RelativeErrors(Section):
+class RelativeErrors(Validated):
     """Of |value - reference| / max(reference, floor)."""
 
     median: float
@@ -139,7 +139,7 @@ class RelativeErrors(Section):
     maximum: float
 
 
-class ColourErrors(Section):
+class ColourErrors(Validated):
     """CIELAB differences at an exposure."""
 
     exposure_ru: float
@@ -148,7 +148,7 @@ class ColourErrors(Section):
     maximum: float
 
 
-class RandomErrors(Section):
+class RandomErrors(Validated):
     """Against the exact sum on random directions: Y of |P|^2, and colours."""
 
     directions: int
@@ -156,7 +156,7 @@ class RandomErrors(Section):
     colour: list[ColourErrors]
 
 
-class CertificateEntry(Section):
+class CertificateEntry(Validated):
     """What the table was planned for, and what it keeps on directions that its planning never saw.
 
     measured: the mean CIELAB error at exposure_ru, within delta_e. reference: the exact sum's fast route against
@@ -170,7 +170,7 @@ class CertificateEntry(Section):
     reference: RelativeErrors
 
 
-class TaylorLoss(Section):
+class TaylorLoss(Validated):
     """What storing the table in half floats adds, against the float table.
 
     relative_error_of_y: over so many "random" directions and the "mirror" directions of their lights (where a
@@ -187,7 +187,7 @@ class TaylorLoss(Section):
     subnormal_share: float
 
 
-class PolarLoss(Section):
+class PolarLoss(Validated):
     """What few textures and half floats leave, on random directions.
 
     textures: RGBA textures, of as many as `most_textures` that would hold everything. error: of what is stored,
@@ -210,7 +210,7 @@ StorageLoss = Annotated[TaylorLoss | PolarLoss, Field(discriminator="layout")]
 # --- the whole -----------------------------------------------------------------------------------------
 
 
-class Colour(Section):
+class Colour(Validated):
     """The space of all numbers. step_nm: of the `wavelengths`; None where each ring has its own, at most so many."""
 
     space: str = "CIE XYZ, linear (not sRGB)"
@@ -222,7 +222,7 @@ class Colour(Section):
     white: str = "a perfect mirror in its own reflection has Y = 1 at 1 RU ('relative'); X and Z are the illuminant's"
 
 
-class Coverage(Section):
+class Coverage(Validated):
     """What the table does not know.
 
     unknown_share: of the (u, v) disc's light, beyond the scan's band: taken as dark. skipped_share: of the
@@ -236,7 +236,7 @@ class Coverage(Section):
     band_limit_per_um: list[float]
 
 
-class Domain(Section):
+class Domain(Validated):
     """How far the scalar model itself can be trusted here: its largest errors against rigorous coupled waves.
 
     Of an order's efficiency, a share of what the flat surface reflects: of a sinusoid and of a blaze with the
@@ -257,7 +257,7 @@ class Domain(Section):
     within: bool | None
 
 
-class MadeBy(Section):
+class MadeBy(Validated):
     diffract_bake: str
     stages: dict[str, int]
     libraries: dict[str, str]
@@ -265,14 +265,14 @@ class MadeBy(Section):
     driver: str
 
 
-class Provenance(Section):
+class Provenance(Validated):
     """The whole config, files by name and content, and the artifacts' addresses in the store."""
 
     config: dict[str, Any]
     artifacts: dict[str, str]
 
 
-class Manifest(Section):
+class Manifest(Validated):
     """manifest.json, whole."""
 
     schema_version: Literal[3]

@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.config.models import Config, PolarLayout, Section
+from pipeline.config.models import Config
 from pipeline.optics import fresnel
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import trapezoid
+from pipeline.validated import Validated
 
 REFLECTANCE = "reflectance.csv"
 _NODES = 257
@@ -32,7 +33,7 @@ REFLECTANCES = {
 INSIDE = "R = 1: the metal's reflectance, at every angle and wavelength, is inside the table"
 
 
-class Samples(Section):
+class Samples(Validated):
     """Index n + ik of the medium at wavelengths, and the weight of each in R; one without dispersion."""
 
     lambda_nm: list[float] | None
@@ -41,7 +42,7 @@ class Samples(Section):
     luminous_weight: list[float]
 
 
-class ReflectanceTable(Section):
+class ReflectanceTable(Validated):
     """R on equidistant nodes of cos_half in [0, 1], for shaders; largest_error: of R, by interpolation."""
 
     file: Literal["reflectance.csv"]
@@ -50,7 +51,7 @@ class ReflectanceTable(Section):
     largest_error: float
 
 
-class MaterialEntry(Section):
+class MaterialEntry(Validated):
     """C = (R / divisor)^exponent G D / w^2 with all numbers; `ior` and `metal` say where they are from."""
 
     fresnel: Literal["none", "schlick", "dielectric", "conductor"]
@@ -95,7 +96,7 @@ def medium(config: Config) -> Medium | None:
     if config.material.fresnel == "dielectric":
         return Medium(None, np.array([config.material.ior], dtype=complex), np.ones(1))
     if config.material.fresnel == "conductor" and not _inside_table(config):
-        quadrature = trapezoid(config.spectrum, config.mean_step_nm)
+        quadrature = trapezoid(config.light, config.table.mean_step_nm)
         index = fresnel.metal_index(config.material.metal, quadrature.lambda_nm)
         return Medium(quadrature.lambda_nm, index, quadrature.weights[:, 1])
     return None
@@ -103,7 +104,7 @@ def medium(config: Config) -> Medium | None:
 
 def _inside_table(config: Config) -> bool:
     """Polar tables hold a metal's reflectance: rho and |w| fix the half angle."""
-    return config.material.fresnel == "conductor" and isinstance(config.table, PolarLayout)
+    return config.material.fresnel == "conductor" and config.table.holds_metals
 
 
 def entry(config: Config) -> MaterialEntry:

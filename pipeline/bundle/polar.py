@@ -40,7 +40,7 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         grid=entry,
         images=_images(config, stored),
         count=stored.textures.count,
-        plan={key: inputs["spectrum"].summary.get(key) for key in _PLANNED},
+        plan={key: inputs["power_spectrum"].summary.get(key) for key in _PLANNED},
         certificate=CertificateEntry.model_validate(inputs["table"].summary["certificate"]),
         loss=loss,
         files=polar_readme.files(entry, stored.textures.count, config.publish.precision),

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
+from pipeline.accuracy.exact import reference_of
 from pipeline.bundle import half
 from pipeline.bundle.manifest import ColourErrors, PolarLoss
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import reference_of
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import relative_unit, table_evaluator
+from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar.compression import Textures, compress, flattened, most_textures, whole
 from pipeline.tables.polar.table import PolarTable
 
@@ -88,11 +88,11 @@ class _Measure:
     """Holds what is stored against the exact sum and against the table before, on random directions."""
 
     def __init__(self, config: Config, table: PolarTable, field: HeightField) -> None:
-        self._config, self._most, self._unit = config, most_textures(table), relative_unit(config)
+        self._config, self._most, self._unit = config, most_textures(table), config.radiometry.unit
         self._wi, self._wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
         reference = reference_of(field, config)
-        self._truth = reference.xyz(config.spectrum, config.material, self._wi, self._wr)
-        evaluate = table_evaluator(table, config)
+        self._truth = reference.xyz(config.light, config.material, self._wi, self._wr)
+        evaluate = table_evaluator(table, config.radiometry)
         self._mirrored = self._wi * [-1.0, -1.0, 1.0]
         self._before, self._mirror = (evaluate(self._wi, views) for views in (self._wr, self._mirrored))
 
@@ -115,7 +115,7 @@ class _Measure:
     def _evaluate(self, textures: Textures, views: Array) -> Array:
         uv = geometry.uvw(self._wi, views)[:, :2]
         g = textures.envelope.at(np.hypot(uv[:, 0], uv[:, 1]))
-        return g[:, None] * table_evaluator(textures.table(), self._config)(self._wi, views)
+        return g[:, None] * table_evaluator(textures.table(), self._config.radiometry)(self._wi, views)
 
     def _errors(self, found: Array, truth: Array, exposure_ru: float) -> ColourErrors:
         error = delta_e(found / self._unit, truth / self._unit, exposure_ru)

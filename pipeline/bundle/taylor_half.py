@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, mirror_luminance, relative_error
+from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, relative_error
 from pipeline.bundle import half
 from pipeline.bundle.manifest import RelativeErrors, TaylorLoss
 from pipeline.config.models import Config
@@ -15,7 +15,7 @@ from pipeline.errors import AccuracyError
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
-from pipeline.tables.evaluate import relative_unit, table_evaluator
+from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor.table import TaylorTable
 
 _EXPOSURE_RU, _SEED = 7500.0, 20141101
@@ -64,11 +64,11 @@ def measure(config: Config, table: TaylorTable, scale: Array) -> TaylorLoss:
     """
     wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
     rounded = in_half(table, scale)
-    errors, worst, unit = {}, 0.0, relative_unit(config)
+    errors, worst, unit = {}, 0.0, config.radiometry.unit
     for name, views in (("random", wr), ("mirror", wi * [-1.0, -1.0, 1.0])):
-        before, after = (table_evaluator(t, config)(wi, views) for t in (table, rounded))
+        before, after = (table_evaluator(t, config.radiometry)(wi, views) for t in (table, rounded))
         known = np.isfinite(before[:, 1])  # a scene need not hold the mirror directions of its lights
-        mirror = mirror_luminance(config, wi, views)[known]
+        mirror = config.radiometry.mirror_luminance(wi, views)[known]
         before, after = before[known], after[known]
         if known.any():
             found = relative_error(after[:, 1] / mirror, before[:, 1] / mirror, MIRROR_FLOOR)

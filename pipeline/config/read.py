@@ -6,8 +6,9 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from pipeline.config.models import Config, Recipe, TaylorLayout
+from pipeline.config.models import Config
 from pipeline.errors import ConfigError
+from pipeline.surface.recipes.parameters import Recipe
 
 _LAYOUTS = ("polar", "taylor")
 _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
@@ -71,7 +72,7 @@ def _repeated_lights(config: Config) -> list[tuple[str, str]]:
 
 def _texture_faults(config: Config) -> list[tuple[str, str]]:
     """The paper's table is an image for every power of w; only a polar one is stored at a chosen rank."""
-    if isinstance(config.table, TaylorLayout) and config.publish.textures not in ("auto", "full"):
+    if not config.table.compresses and config.publish.textures not in ("auto", "full"):
         return [
             ("publish.textures", f"{config.publish.textures} textures hold a polar table only; leave it out here")
         ]

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from pipeline.config.models import Section
+from pipeline.validated import Validated
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -16,7 +16,7 @@ class _WithoutTitles(GenerateJsonSchema):
         return False
 
 
-def of(model: type[Section], title: str, mode: Literal["validation", "serialization"]) -> dict[str, Any]:
+def of(model: type[Validated], title: str, mode: Literal["validation", "serialization"]) -> dict[str, Any]:
     """The schema of a document: as it may be written ("validation"), or as this project writes it.
 
     It tells keys, types, ranges, choices and defaults. What ties keys together (such as either `path` or `recipe`) is

@@ -9,12 +9,13 @@ from math import exp, pi
 import numpy as np
 from scipy.special import jv
 
-from pipeline.config.models import LARGEST_TOLERANCE
 from pipeline.errors import AccuracyError
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 
+# a larger relative error of a table leaves not even one digit
+LARGEST_TOLERANCE = 0.1
 W_MAX = 2.0  # |w| = cos ti + cos tr
 _MOST_TERMS = 400
 # |P|^2 below this share of the mirror is held to an absolute error: 1e-4 of it is 1e-7 of the mirror

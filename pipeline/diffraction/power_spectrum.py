@@ -14,8 +14,7 @@ from scipy.special import jv
 
 from kernels import polar_spectrum
 from kernels.spectral_operator import chebyshev
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.upload import upload
 from pipeline.optics.coherence import sigma_f
@@ -35,7 +34,7 @@ _CONTRAST_AZIMUTHS = 65
 
 
 @dataclass(frozen=True)
-class PolarSpectrum:
+class PolarPowerSpectrum:
     """E on radii, azimuths and nodes in s.
 
     values: float32 (tiles, radii, s nodes, 16): azimuth 16 tile + lane; 0 beyond the scan's band.
@@ -54,7 +53,7 @@ class PolarSpectrum:
         """The nodes in s = 2 pi |w| / lambda, 1/um."""
         return s_nodes(self.values.shape[2], self.s_max_per_um)
 
-    def thinned(self, every: int) -> "PolarSpectrum":
+    def thinned(self, every: int) -> "PolarPowerSpectrum":
         """The same on every `every`-th azimuth; what is left must fill whole tiles of both half turns."""
         tiles, radii, nodes, lanes = self.values.shape
         flat = np.moveaxis(self.values, 3, 1).reshape(tiles * lanes, radii, nodes)[::every]
@@ -63,14 +62,14 @@ class PolarSpectrum:
         return replace(self, values=np.ascontiguousarray(values), azimuths=azimuths)
 
 
-def speckle_contrast(spectrum: PolarSpectrum) -> float:
+def speckle_contrast(power: PolarPowerSpectrum) -> float:
     """Variance of E over its squared local mean: 1 for the speckle of one window, 1 / n for the mean of n.
 
     Taken over azimuths, at the radii beyond the specular lobe and the middle node in s; where E is dark or smooth it
     counts as little.
     """
-    tiles, radii, nodes, lanes = spectrum.values.shape
-    e = np.moveaxis(spectrum.values[:, radii // 4 : -_SPARE_RADII, nodes // 2], 2, 1).reshape(tiles * lanes, -1)
+    tiles, radii, nodes, lanes = power.values.shape
+    e = np.moveaxis(power.values[:, radii // 4 : -_SPARE_RADII, nodes // 2], 2, 1).reshape(tiles * lanes, -1)
     kernel = np.ones(min(_CONTRAST_AZIMUTHS, len(e)))
     kernel /= len(kernel)
     # around the turn: E is periodic
@@ -101,23 +100,23 @@ def chebyshev_stack(
     terms: int,
     tolerance: float,
     progress: Progress = silent,
-) -> stack.Stack:
+) -> dft_stack.Stack:
     """The float32 stack that E out to `reach_per_um` gathers from.
 
     It fills whole vectors: they cost the same, and are shared with the device without a copy.
     """
     filled = polar_spectrum.LANES * ceil(terms / polar_spectrum.LANES)
-    built = stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
+    built = dft_stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
     return replace(built, terms=terms)
 
 
 def s_max(lambda_min_nm: float) -> float:
     """The largest s = k |w| of E, 1/um: somewhat beyond |w| = 2 at the shortest wavelength."""
-    return S_REACH * 2.0 * pi * series.W_MAX / (1e-3 * lambda_min_nm)
+    return S_REACH * 2.0 * pi * expansion.W_MAX / (1e-3 * lambda_min_nm)
 
 
 def gather(
-    built: stack.Stack, half_turn: Array, radius_per_um: Array, lambda_min_nm: float, nodes: int
+    built: dft_stack.Stack, half_turn: Array, radius_per_um: Array, lambda_min_nm: float, nodes: int
 ) -> NDArray[np.float32]:
     """E (tiles, radii, nodes, 16) at azimuths of half a turn (radians, a multiple of 16), then at their opposites.
 
@@ -131,8 +130,10 @@ def gather(
 
 
 def build(
-    built: stack.Stack, azimuths: Azimuths, radius_per_um: Array, lambda_min_nm: float, nodes: int
-) -> PolarSpectrum:
+    built: dft_stack.Stack, azimuths: Azimuths, radius_per_um: Array, lambda_min_nm: float, nodes: int
+) -> PolarPowerSpectrum:
     """E of a Chebyshev stack on given azimuths and radii, out to `s_max`."""
     values = gather(built, azimuths.angles()[: azimuths.count // 2], radius_per_um, lambda_min_nm, nodes)
-    return PolarSpectrum(values, radius_per_um, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um)
+    return PolarPowerSpectrum(
+        values, radius_per_um, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um
+    )

@@ -15,18 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import diffraction
-from pipeline.config.models import FINE_STEP_NM, Config, Material, PolarLayout, Spectrum
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.upload import upload
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
+from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent
-from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Evaluator
 
 STEP_NM = FINE_STEP_NM
 # in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11
@@ -68,11 +65,9 @@ def in_band(field: HeightField, uvw: Array, lambda_um: Array) -> NDArray[np.bool
     return np.asarray((np.abs(uvw[:, :1]) / lambda_um <= fx) & (np.abs(uvw[:, 1:2]) / lambda_um <= fy))
 
 
-def xyz_direct(
-    field: HeightField, sigma_um: float, spectrum: Spectrum, material: Material, wi: Array, wr: Array
-) -> Array:
+def xyz_direct(field: HeightField, sigma_um: float, light: Light, material: Material, wi: Array, wr: Array) -> Array:
     """XYZ (directions, 3) under 1 RU by `power_direct` at every nanometre; `wi`, `wr` (directions, 3)."""
-    quadrature = trapezoid(spectrum, STEP_NM)
+    quadrature = trapezoid(light, STEP_NM)
     uvw = geometry.uvw(wi, wr)
     power = np.stack([power_direct(field, sigma_um, uvw, nm) for nm in quadrature.lambda_nm], axis=-1)
     return integrate(power, quadrature, material, sigma_um, wi, wr)
@@ -114,12 +109,12 @@ class Reference:
     def __init__(
         self, field: HeightField, sigma_um: float, lambda_min_nm: float, progress: Progress = silent
     ) -> None:
-        z = series.largest_phase(field.half_range_um, lambda_min_nm)
+        z = expansion.largest_phase(field.half_range_um, lambda_min_nm)
         # whole vectors of terms cost the same and are shared with the device without a copy
         lanes = diffraction.LANES
-        terms = lanes * -(-(series.chebyshev_order(z, _TOLERANCE) + 1) // lanes)
-        reachable = series.W_MAX / (1e-3 * lambda_min_nm)
-        built = stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
+        terms = lanes * -(-(expansion.chebyshev_order(z, _TOLERANCE) + 1) // lanes)
+        reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
+        built = dft_stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
         self._sigma_um = sigma_um
         self._stack = upload(built)
         self.stored_bytes = built.coefficients.nbytes
@@ -130,7 +125,7 @@ class Reference:
 
     def xyz(
         self,
-        spectrum: Spectrum,
+        light: Light,
         material: Material,
         wi: Array,
         wr: Array,
@@ -138,7 +133,7 @@ class Reference:
         progress: Progress = silent,
     ) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        quadrature = trapezoid(spectrum, step_nm)
+        quadrature = trapezoid(light, step_nm)
         uvw = geometry.uvw(wi, wr)
         order, out = diffraction.line_order(uvw), np.empty((len(wr), 3))
         for tile in _tiles(len(wr)):
@@ -161,9 +156,9 @@ class MeanReference:
         self.fields, self._sigma_um, self._lambda_min_nm, self._progress = fields, sigma_um, lambda_min_nm, progress
         self.first = Reference(fields[0], sigma_um, lambda_min_nm, progress)
 
-    def xyz(self, spectrum: Spectrum, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
+    def xyz(self, light: Light, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        return self._mean(lambda each: each.xyz(spectrum, material, wi, wr, progress=progress))
+        return self._mean(lambda each: each.xyz(light, material, wi, wr, progress=progress))
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
@@ -174,23 +169,6 @@ class MeanReference:
         for field in self.fields[1:]:
             total = total + answer(Reference(field, self._sigma_um, self._lambda_min_nm, self._progress))
         return total / len(self.fields)
-
-
-def reference_of(field: HeightField, config: Config, progress: Progress = silent) -> MeanReference:
-    """The reference of a config: the mean over windows where its table is one, else the middle window's."""
-    fields = windows.places(field, config.coherence) if isinstance(config.table, PolarLayout) else [field]
-    lambda_min = shortest_wavelength_nm(config.spectrum)
-    return MeanReference(fields, config.coherence.sigma_um, lambda_min, progress)
-
-
-def reference_evaluator(field: HeightField, config: Config, progress: Progress = silent) -> Evaluator:
-    """XYZ of pairs of directions by the exact reference under a config's light and material."""
-    reference = reference_of(field, config, progress)
-
-    def evaluate(wi: Array, wr: Array) -> Array:
-        return reference.xyz(config.spectrum, config.material, wi, wr, progress=progress)
-
-    return evaluate
 
 
 def _tiles(count: int) -> Iterator[slice]:

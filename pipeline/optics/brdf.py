@@ -5,16 +5,65 @@ The reflected radiance under unit irradiance is `direction_factor * sum_l spectr
 unless a metal's reflectance depends on wavelength and angle together; `metal_reflectance` is that exact case.
 """
 
-from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
-from pipeline.config.models import FINE_STEP_NM, Config, Material, Spectrum
 from pipeline.optics import fresnel, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
+from pipeline.optics.material import Material
+
+
+@dataclass(frozen=True)
+class Radiometry:
+    """All that turns |P|^2 into radiance: light, material and the coherence window's width.
+
+    sigma_um: standard deviation of the coherence window, um. mean_step_nm: step of the means over wavelength that are
+    taken outside the spectral integral, such as a metal's luminous mean.
+    """
+
+    light: Light
+    material: Material
+    sigma_um: float
+    mean_step_nm: float = FINE_STEP_NM
+
+    def illumination(self, step_nm: float) -> Quadrature:
+        """Light, observer and the window's area, as one quadrature for R |P|^2, on nodes `step_nm` apart."""
+        quadrature = trapezoid(self.light, step_nm)
+        area = window_area(self.material, quadrature, self.sigma_um)
+        return Quadrature(quadrature.lambda_nm, quadrature.weights * area[:, None])
+
+    def integrand(self, step_nm: float) -> Quadrature:
+        """Light, observer and all of the material that varies with wavelength, as one quadrature for |P|^2."""
+        quadrature = trapezoid(self.light, step_nm)
+        factor = spectral_factor(self.material, quadrature, self.sigma_um)
+        return Quadrature(quadrature.lambda_nm, quadrature.weights * factor[:, None])
+
+    def reflectance(self, lambda_nm: Array, cos_half: Array) -> Array:
+        """R (..., L) inside the spectral integral at half angles (...,): a metal's; 1 of every other material."""
+        if self.material.fresnel != "conductor":
+            return grey(lambda_nm, cos_half)
+        return _metal(self.material, trapezoid(self.light, FINE_STEP_NM), lambda_nm, cos_half)
+
+    def direction_factor(self, wi: Array, wr: Array) -> Array:
+        """C cos(ti) (...,) for directions (..., 3), with means over wavelength at `mean_step_nm`."""
+        return direction_factor(self.material, self._mean_light, wi, wr)
+
+    def mirror_luminance(self, wi: Array, wr: Array) -> Array:
+        """Y (...,) that |P|^2 = 1 at every wavelength would give at directions (..., 3)."""
+        inside = self.integrand(self.mean_step_nm).weights[:, 1].sum()
+        return self.direction_factor(wi, wr) * float(inside)
+
+    @property
+    def unit(self) -> float:
+        """Y of 1 RU: what exposures are multiples of."""
+        return relative_unit(self.material, self._mean_light, self.sigma_um)
+
+    @property
+    def _mean_light(self) -> Quadrature:
+        return trapezoid(self.light, self.mean_step_nm)
 
 
 def direction_factor(material: Material, quadrature: Quadrature, wi: Array, wr: Array) -> Array:
@@ -42,40 +91,9 @@ def geometry_factor(material: Material, wi: Array, wr: Array) -> Array:
     return factor * geometry.v_cavity(wi, wr) if material.shadowing else factor
 
 
-def illumination(material: Material, spectrum: Spectrum, sigma_um: float, step_nm: float) -> Quadrature:
-    """Light, observer and the window's area, as one quadrature for R |P|^2."""
-    quadrature = trapezoid(spectrum, step_nm)
-    area = window_area(material, quadrature, sigma_um)
-    return Quadrature(quadrature.lambda_nm, quadrature.weights * area[:, None])
-
-
-def illumination_of(config: Config) -> Callable[[float], Quadrature]:
-    """`illumination` by wavelength step, nm, of a config."""
-    return partial(illumination, config.material, config.spectrum, config.coherence.sigma_um)
-
-
-def integrand_of(config: Config) -> Callable[[float], Quadrature]:
-    """`integrand` by wavelength step, nm, of a config."""
-    return partial(integrand, config.material, config.spectrum, config.coherence.sigma_um)
-
-
 def grey(lambda_nm: Array, cos_half: Array) -> Array:
     """1 (..., L): nothing of R varies with wavelength, so all of it stays outside the spectral integral."""
     return np.broadcast_to(1.0, (*np.shape(cos_half), len(lambda_nm)))
-
-
-def spectral_reflectance(material: Material, spectrum: Spectrum, lambda_nm: Array, cos_half: Array) -> Array:
-    """What of R stays inside the spectral integral (..., L) at half angles (...,): a metal's; 1 of all else."""
-    if material.fresnel != "conductor":
-        return grey(lambda_nm, cos_half)
-    return _metal(material, trapezoid(spectrum, FINE_STEP_NM), lambda_nm, cos_half)
-
-
-def integrand(material: Material, spectrum: Spectrum, sigma_um: float, step_nm: float) -> Quadrature:
-    """Light, observer and all of the material that varies with wavelength, as one quadrature for |P|^2."""
-    quadrature = trapezoid(spectrum, step_nm)
-    factor = spectral_factor(material, quadrature, sigma_um)
-    return Quadrature(quadrature.lambda_nm, quadrature.weights * factor[:, None])
 
 
 def spectral_factor(material: Material, quadrature: Quadrature, sigma_um: float) -> Array:

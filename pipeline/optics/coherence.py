@@ -1,13 +1,27 @@
 """The Gaussian window that spatial coherence puts on the surface, [D14] 4.2."""
 
 from math import ceil, log, pi, sqrt
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from pipeline.optics.geometry import Array
+from pipeline.validated import Validated
 
 # exp(-8.5^2 / 2) = 2e-16: beyond this many sigma the window is below float64's rounding of its peak
 BLIND_SIGMAS = 8.5
+
+
+class Coherence(Validated):
+    """The Gaussian window exp(-r^2 / (2 sigma^2)) of coherent light; 65 um = 4 sigma in [D14] 4.2.
+
+    windows: "auto" averages |P|^2 over the windows that a larger scan holds (polar tables), "centre" takes one.
+    """
+
+    sigma_um: Annotated[float, Field(ge=1e-3, le=1e4)] = 16.25
+    boundary: Literal["periodic"] = "periodic"
+    windows: Literal["auto", "centre"] = "auto"
 
 
 def sigma_f(sigma_um: float) -> float:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pipeline.config.models import Scene
 from pipeline.optics import geometry
 from pipeline.optics.geometry import Array
+from pipeline.optics.scene import Scene
 
 # the rim itself is left out: cos -> 0 there
 _WIDEST_DEG = 88.0

@@ -1,21 +1,19 @@
 """Table: power spectrum, light and material -> the polar table of XYZ, with its certificate."""
 
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.accuracy import certificate
+from pipeline.accuracy.exact import reference_of
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
-from pipeline.diffraction.reference import reference_of
 from pipeline.diffraction.upload import kernel_digest
-from pipeline.optics import brdf
 from pipeline.progress import Progress
-from pipeline.stages import spectrum, surface
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.stages import power_spectrum, surface
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import table_evaluator
@@ -27,8 +25,8 @@ _FILE = "table.zarr"
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernels": kernel_digest(*spectrum.PLANNING_KERNELS, "power_spectrum.cl"),
-        "spectrum": spectrum_parameters(config),
+        "kernels": kernel_digest(*power_spectrum.PLANNING_KERNELS, "power_spectrum.cl"),
+        "spectrum": light_parameters(config),
         # the certificate is over colours, so all of the material counts
         "material": material_parameters(config),
         "accuracy": config.accuracy.model_dump(mode="json"),
@@ -36,18 +34,18 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    power = spectrum.load(inputs["spectrum"])
-    plan = spectrum.planned(inputs["spectrum"])
-    light = brdf.illumination_of(config)
-    budget = spectrum.budget(config)
+    power = power_spectrum.load(inputs["power_spectrum"])
+    plan = power_spectrum.planned(inputs["power_spectrum"])
+    light = config.radiometry.illumination
+    budget = power_spectrum.budget(config)
     rules = quadrature.choose(light, plan.rings.rho(), config.coherence.sigma_um, budget.quadrature)
-    reflectance = partial(brdf.spectral_reflectance, config.material, config.spectrum)
+    reflectance = config.radiometry.reflectance
     table = polar.build(power, plan.rings, rules, plan.w_terms, reflectance)
     progress("table", 1.0)
-    unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.mean_step_nm))
+    unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.table.mean_step_nm))
     field = surface.load(inputs["surface"])
     reference = reference_of(field, config)
-    certified = certificate.certify(table_evaluator(table, config), reference, config, progress)
+    certified = certificate.certify(table_evaluator(table, config.radiometry), reference, config, progress)
     spectral = certificate.certify_spectral(power, reference, config)
     arrays.save(
         folder / _FILE,
@@ -85,4 +83,4 @@ def load(artifact: Artifact) -> polar.PolarTable:
     return polar.PolarTable(arrays.load(zarr, "table"), grid)
 
 
-TABLE = Stage("table", 4, ("surface", "spectrum"), _parameters, _produce)
+TABLE = Stage("table", 4, ("surface", "power_spectrum"), _parameters, _produce)

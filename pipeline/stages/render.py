@@ -5,22 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config.models import Config, Direction
+from pipeline.config.models import Config
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import pixels
 from pipeline.optics.geometry import Array
+from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images
 from pipeline.stages import table
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
-from pipeline.tables.evaluate import Map, relative_unit, render_map, table_evaluator
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
+from pipeline.tables.evaluate import Map, render_map, table_evaluator
 
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
         "render": config.render.model_dump(mode="json"),
         "material": material_parameters(config),
-        "spectrum": spectrum_parameters(config),
+        "spectrum": light_parameters(config),
     }
 
 
@@ -40,8 +41,8 @@ def map_radius(config: Config) -> float:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    evaluate = table_evaluator(table.load(config, inputs["table"]), config)
-    views, unit = Map(config.render.size, map_radius(config)), relative_unit(config)
+    evaluate = table_evaluator(table.load(config, inputs["table"]), config.radiometry)
+    views, unit = Map(config.render.size, map_radius(config)), config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):
         image = render_map(evaluate, light_direction(light), views)

@@ -7,24 +7,25 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from pipeline.config.models import Config, PolarLayout
+from pipeline.config.models import Config
 from pipeline.diffraction.device import require_device
 from pipeline.progress import Progress, silent
 from pipeline.stages import provenance, table, validate
+from pipeline.stages.power_spectrum import POWER_SPECTRUM
 from pipeline.stages.render import RENDER
-from pipeline.stages.spectrum import SPECTRUM
 from pipeline.stages.stack import STACK
 from pipeline.stages.stage import Stage
 from pipeline.stages.surface import SURFACE
 from pipeline.store.store import Artifact, Store
+from pipeline.tables.polar.layout import PolarLayout
 
 UNCHANGED = "nothing it reads has changed"
-_ON_DEVICE = {"spectrum", "table", "render", "validate"}
+_ON_DEVICE = {"power_spectrum", "table", "render", "validate"}
 
 
 def stages(config: Config) -> tuple[Stage, ...]:
-    """Every stage of a config, in order: a table of either layout is made of its own spectrum of the surface."""
-    before = SPECTRUM if isinstance(config.table, PolarLayout) else STACK
+    """Every stage of a config, in order: a table of either layout is made of its own transform of the surface."""
+    before = POWER_SPECTRUM if isinstance(config.table, PolarLayout) else STACK
     return (SURFACE, before, table.stage_of(config), RENDER, validate.stage_of(config))
 
 
@@ -170,7 +171,7 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
 def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
     """The work in the stage's own units, and how long it took the last time."""
     texts = {
-        "spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
+        "power_spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
         "table": table.size_of(config),
         "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
         "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",

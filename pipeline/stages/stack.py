@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config.models import Config, TaylorLayout
-from pipeline.diffraction import dft_stack
-from pipeline.diffraction import expansion as series
-from pipeline.optics.spectra import trapezoid
+from pipeline.config.models import Config
+from pipeline.diffraction import dft_stack, expansion
+from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary, spectrum_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
+from pipeline.tables.taylor.layout import TaylorLayout
 
 _FILE = "stack.zarr"
 
@@ -27,7 +27,7 @@ def layout_of(config: Config) -> TaylorLayout:
 def _parameters(config: Config) -> dict[str, Any]:
     table = layout_of(config)
     return {
-        "spectrum": spectrum_parameters(config),
+        "spectrum": light_parameters(config),
         "sigma_um": config.coherence.sigma_um,
         "terms": table.terms,
         "tolerance": table.tolerance,
@@ -38,15 +38,15 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     field = surface.load(inputs["surface"])
     table = layout_of(config)
-    quadrature = trapezoid(config.spectrum, table.step_nm)
+    quadrature = trapezoid(config.light, table.step_nm)
     order = None if table.terms == "auto" else table.terms
-    plan = series.plan_taylor(field, quadrature, table.tolerance, order)
+    plan = expansion.plan_taylor(field, quadrature, table.tolerance, order)
     built = dft_stack.build(
         field,
         "taylor",
         plan.order + 1,
         config.coherence.sigma_um,
-        series.W_MAX / (1e-3 * quadrature.lambda_min_nm),
+        expansion.W_MAX / (1e-3 * quadrature.lambda_min_nm),
         dft_stack.window_tolerance(table.tolerance),
         progress,
     )

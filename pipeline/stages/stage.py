@@ -49,11 +49,11 @@ def file_or_name(name: str) -> dict[str, str]:
     return {"name": name}
 
 
-def spectrum_parameters(config: Config) -> dict[str, Any]:
+def light_parameters(config: Config) -> dict[str, Any]:
     """The [spectrum] section, an illuminant's CSV by its content."""
-    section = config.spectrum.model_dump(mode="json")
-    if isinstance(config.spectrum.illuminant, str):
-        section["illuminant"] = file_or_name(config.spectrum.illuminant)
+    section = config.light.model_dump(mode="json")
+    if isinstance(config.light.illuminant, str):
+        section["illuminant"] = file_or_name(config.light.illuminant)
     return section
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 from pipeline.config.models import Config
 from pipeline.errors import ScanError
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store import arrays, digest
@@ -31,7 +30,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     return {
         "surface": section,
         "sigma_um": config.coherence.sigma_um,
-        "lambda_min_nm": shortest_wavelength_nm(config.spectrum),
+        "lambda_min_nm": config.light.lambda_min_nm,
     }
 
 
@@ -46,7 +45,7 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
         field, record = load_scan(config.surface)
         scan = asdict(record)
     field, cleaning = condition(field, config.surface.levelling, config.surface.clip_percentile)
-    lambda_min = shortest_wavelength_nm(config.spectrum)
+    lambda_min = config.light.lambda_min_nm
     statistics = measure(field, config.coherence.sigma_um, lambda_min)
     x, y = field.coordinates_um()
     arrays.save(

@@ -1,9 +1,10 @@
 """The table stage of either layout: one name, one place in the order."""
 
-from pipeline.config.models import Config, PolarLayout
+from pipeline.config.models import Config
 from pipeline.stages import polar_table, taylor_table
 from pipeline.stages.stage import Stage
 from pipeline.store.store import Artifact
+from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.table import PolarTable
 from pipeline.tables.taylor.table import TaylorTable
 

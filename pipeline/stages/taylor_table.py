@@ -7,10 +7,9 @@ import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.diffraction.upload import kernel_digest
-from pipeline.optics import brdf
 from pipeline.progress import Progress
 from pipeline.stages import stack
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.taylor import grid
@@ -23,7 +22,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     material = material_parameters(config)
     return {
         "kernel": kernel_digest("windowed_dft.cl", "taylor_table.cl"),
-        "spectrum": spectrum_parameters(config),
+        "spectrum": light_parameters(config),
         # angles stay outside the table: only what varies with wavelength enters
         "material": {key: material[key] for key in ("normalisation", "metal")},
         "table": config.table.model_dump(mode="json"),
@@ -34,7 +33,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     built = stack.load(inputs["stack"])
     section = stack.layout_of(config)
-    quadrature = brdf.integrand_of(config)(section.step_nm)
+    quadrature = config.radiometry.integrand(section.step_nm)
     table = taylor.build(built, quadrature, section.resolution, section.power, config.scene, progress)
     nodes = grid.nodes(table.resolution, table.power)
     arrays.save(

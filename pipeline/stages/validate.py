@@ -8,13 +8,15 @@ from typing import Any
 
 from pipeline.accuracy import checks as validation
 from pipeline.accuracy import convergence
-from pipeline.config.models import Config, TaylorLayout
-from pipeline.diffraction.reference import MeanReference, reference_of
+from pipeline.accuracy.exact import reference_of
+from pipeline.config.models import Config
+from pipeline.diffraction.reference import MeanReference
 from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
-from pipeline.stages import render, spectrum, stack, surface, table
-from pipeline.stages.stage import Inputs, Stage, Summary, material_parameters, spectrum_parameters
+from pipeline.stages import power_spectrum, render, stack, surface, table
+from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.tables.evaluate import Evaluator, table_evaluator
+from pipeline.tables.taylor.layout import TaylorLayout
 
 REPORT = "report.html"
 
@@ -24,7 +26,7 @@ def _parameters(config: Config) -> dict[str, Any]:
         "kernel": kernel_digest("power_spectrum.cl"),
         "name": config.name,
         "material": material_parameters(config),
-        "spectrum": spectrum_parameters(config),
+        "spectrum": light_parameters(config),
         "accuracy": config.accuracy.model_dump(mode="json"),
         "render": config.render.model_dump(mode="json"),
     }
@@ -49,7 +51,7 @@ def _measured(
     """The numbers of the summary, and the pictures by name as `drawing` makes them."""
     field = surface.load(inputs["surface"])
     drawn = {"surface": drawing.submit(_picture, "height_map", field)}
-    evaluate = table_evaluator(table.load(config, inputs["table"]), config)
+    evaluate = table_evaluator(table.load(config, inputs["table"]), config.radiometry)
     reference = reference_of(field, config, progress)
     radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
     first = render.light_direction(config.render.lights[0])
@@ -100,8 +102,8 @@ def _study(
     """What there is to vary in a config's layout."""
     if isinstance(config.table, TaylorLayout):
         return convergence.TaylorStudy(stack.load(inputs["stack"]), config.table, evaluate, coarse)
-    power = inputs["spectrum"]
-    return convergence.PolarStudy(spectrum.load(power), spectrum.planned(power), evaluate, coarse)
+    power = inputs["power_spectrum"]
+    return convergence.PolarStudy(power_spectrum.load(power), power_spectrum.planned(power), evaluate, coarse)
 
 
 def _curves(study: convergence.Study, progress: Progress) -> list[convergence.Curve]:
@@ -122,5 +124,5 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
 
 def stage_of(config: Config) -> Stage:
     """Validation of either layout: it reads what the table was made of, too."""
-    before = "stack" if isinstance(config.table, TaylorLayout) else "spectrum"
+    before = "stack" if isinstance(config.table, TaylorLayout) else "power_spectrum"
     return Stage("validate", 2, ("surface", before, "table", "render"), _parameters, _produce)

@@ -69,11 +69,11 @@ def _settings_rows(before: dict[str, Any], table: dict[str, Any]) -> Rows:
     return _polar_rows(before, table) if table["layout"] == "polar" else _taylor_rows(before, table)
 
 
-def _polar_rows(spectrum: dict[str, Any], table: dict[str, Any]) -> Rows:
+def _polar_rows(power_spectrum: dict[str, Any], table: dict[str, Any]) -> Rows:
     rings, azimuths, certificate = table["rings"], table["azimuths"], table["certificate"]
     return [
-        ["Chebyshev terms, nodes in s", f"{spectrum['terms']}, {spectrum['s_nodes']}"],
-        ["windows averaged, contrast left", f"{spectrum['windows']}, {spectrum['speckle_contrast']:.2f}"],
+        ["Chebyshev terms, nodes in s", f"{power_spectrum['terms']}, {power_spectrum['s_nodes']}"],
+        ["windows averaged, contrast left", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
         ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
         ["rings even below ρ =", f"{rings['r0']:.3g}"],
         [
@@ -109,7 +109,7 @@ def build(
 ) -> str:
     """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
     surface, table, render = (inputs[name].summary for name in ("surface", "table", "render"))
-    before = next(inputs[name].summary for name in ("stack", "spectrum") if name in inputs)
+    before = next(inputs[name].summary for name in ("stack", "power_spectrum") if name in inputs)
     page = Page(config.name, "Diffraction BRDF: what was baked and how far it is from the exact sum.")
     page.warnings(surface["warnings"])
     page.section("BRDF maps", f"All views of one light each, at {config.render.exposure_ru:g} RU.")

@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import Surface, as_pair
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.readers import read_scan
 from pipeline.surface.readers.common import check_shape, fault, micrometres
 from pipeline.surface.scan import Scan
+from pipeline.surface.source import SurfaceSource
+from pipeline.validated import as_pair
 
 # a config key may repeat what the file says, to this relative precision
 _AGREES = 1e-3
@@ -43,7 +44,7 @@ class ScanRecord:
     holes: int
 
 
-def load_scan(surface: Surface) -> tuple[HeightField, ScanRecord]:
+def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
     """The heights of surface.path in um, holes as NaN, and the record of how they were read.
 
     The file's units win over the config's keys. Raises ScanError where the file cannot be read, a unit is
@@ -129,7 +130,7 @@ def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, 
 
 
 def _units(
-    file: str, scan: Scan, surface: Surface
+    file: str, scan: Scan, surface: SurfaceSource
 ) -> tuple[tuple[float, Source], tuple[tuple[float, float], Source]]:
     """(um per stored unit, its source) and (pitch in um, its source); every missing key in one error."""
     unit = _unit(file, scan, surface)
@@ -146,7 +147,7 @@ def _units(
     raise fault(file, "units", f"a file ({scan.format}) that does not state them", f"set {' and '.join(missing)}")
 
 
-def _unit(file: str, scan: Scan, surface: Surface) -> tuple[float, Source] | None:
+def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Source] | None:
     if scan.full_code is not None:
         return _unit_of_image(file, scan.full_code, surface)
     if surface.height_range_um is not None:
@@ -163,7 +164,7 @@ def _unit(file: str, scan: Scan, surface: Surface) -> tuple[float, Source] | Non
     raise fault(file, "units that agree", f"{found} ({told:g} um)", _OVERRIDE)
 
 
-def _unit_of_image(file: str, full_code: float, surface: Surface) -> tuple[float, Source] | None:
+def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple[float, Source] | None:
     if surface.height_unit is not None:
         found = f"surface.height_unit = '{surface.height_unit}', but an image holds codes 0..{full_code:g}"
         raise fault(file, "a height range", found, "set surface.height_range_um instead")
@@ -172,7 +173,7 @@ def _unit_of_image(file: str, full_code: float, surface: Surface) -> tuple[float
     return surface.height_range_um / full_code, "config"
 
 
-def _pitch(file: str, scan: Scan, surface: Surface) -> tuple[tuple[float, float], Source] | None:
+def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Source] | None:
     told = None if surface.pitch_um is None else as_pair(surface.pitch_um)
     if scan.pitch_um is None:
         return None if told is None else (told, "config")

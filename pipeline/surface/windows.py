@@ -9,7 +9,7 @@ from math import floor
 
 import numpy as np
 
-from pipeline.config.models import Coherence
+from pipeline.optics.coherence import Coherence
 from pipeline.surface.heightfield import HeightField
 
 # a window is four sigma wide ([D14] 4.2); windows half a width apart still add to each other

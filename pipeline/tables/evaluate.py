@@ -2,57 +2,44 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from typing import Protocol
 
 import numpy as np
 
-from pipeline.config.models import Config
-from pipeline.optics import brdf, geometry
+from pipeline.optics import geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
 from pipeline.progress import Progress, silent
-from pipeline.tables.polar import table as polar
-from pipeline.tables.polar.table import PolarTable
-from pipeline.tables.taylor import table as taylor
-from pipeline.tables.taylor.table import TaylorTable
 
 # XYZ (directions, 3) under 1 RU for wi, wr (directions, 3)
 Evaluator = Callable[[Array, Array], Array]
 _AT_ONCE = 16384
 
 
-def table_evaluator(table: PolarTable | TaylorTable, config: Config, progress: Progress = silent) -> Evaluator:
-    """XYZ = C cos(ti) times what the table holds; NaN where the table's scene does not reach."""
-    outside = _outside_factor(table, config)
+class Table(Protocol):
+    """A table of any layout, as it is looked up."""
+
+    def look_up(self, uvw: Array) -> Array:
+        """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN where the table does not reach."""
+
+    def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+        """C cos(ti) (directions,): the factors of the radiance that the table leaves out."""
+
+
+def table_evaluator(table: Table, radiometry: Radiometry, progress: Progress = silent) -> Evaluator:
+    """XYZ = C cos(ti) times the table's value; NaN where the table's scene does not reach."""
 
     def evaluate(wi: Array, wr: Array) -> Array:
-        factor = outside(wi, wr)
+        factor = table.direction_factor(radiometry, wi, wr)
         uvw = geometry.uvw(wi, wr)
         out = np.empty((len(wr), 3))
         for first in range(0, len(wr), _AT_ONCE):
             part = np.s_[first : first + _AT_ONCE]
-            out[part] = factor[part, None] * _look_up(table, uvw[part])
+            out[part] = factor[part, None] * table.look_up(uvw[part])
             progress("look-up", min(1.0, (first + _AT_ONCE) / len(wr)))
         return out
 
     return evaluate
-
-
-def _outside_factor(table: PolarTable | TaylorTable, config: Config) -> Callable[[Array, Array], Array]:
-    """C cos(ti), as far as the table does not hold it: polar tables hold a metal's reflectance at every angle."""
-    if isinstance(table, PolarTable) and config.material.fresnel == "conductor":
-        return partial(brdf.geometry_factor, config.material)
-    return partial(brdf.direction_factor, config.material, trapezoid(config.spectrum, config.mean_step_nm))
-
-
-def _look_up(table: PolarTable | TaylorTable, uvw: Array) -> Array:
-    return polar.look_up(table, uvw) if isinstance(table, PolarTable) else taylor.look_up(table, uvw)
-
-
-def relative_unit(config: Config) -> float:
-    """Y of 1 RU in a config's normalisation: what exposures are multiples of."""
-    quadrature = trapezoid(config.spectrum, config.mean_step_nm)
-    return brdf.relative_unit(config.material, quadrature, config.coherence.sigma_um)
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,12 @@ def test_physics_knows_no_stages():
     assert offenders(["pipeline/optics"], "pipeline.store.store") == {}
 
 
+def test_physics_knows_no_config():
+    """Closed forms, transforms and tables take values; only stages and what is above them open a config."""
+    rooms = ("optics", "surface", "fourier", "diffraction", "tables")
+    assert offenders([f"pipeline/{room}" for room in rooms], "pipeline.config") == {}
+
+
 @pytest.mark.parametrize("room", ["pipeline", "kernels"])
 def test_libraries_do_not_print(room):
     """Text for people is the command line's; what a file does when it is run as a script is its own."""

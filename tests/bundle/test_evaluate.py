@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.accuracy.checks import mirror_luminance
 from pipeline.bundle import evaluate, material
 from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.polar import grid_entry
@@ -19,11 +18,10 @@ from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import trapezoid
 from pipeline.stages import table as table_stage
 from pipeline.tables.evaluate import table_evaluator
-from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.compression import whole
 from pipeline.tables.polar.table import PolarTable
 
@@ -38,9 +36,9 @@ SEED = 3
 def both(bake: Baker, config: Config, out: Path, wi: Array, wr: Array) -> tuple[Array, Array]:
     """XYZ by the bundle's page and by the tool, as shares of what a mirror gives."""
     inputs = bake(config)
-    expected = table_evaluator(table_stage.load(config, inputs["table"]), config)(wi, wr)
+    expected = table_evaluator(table_stage.load(config, inputs["table"]), config.radiometry)(wi, wr)
     found = bundle_evaluator(publish(config, inputs, out))(wi, wr)
-    mirror = mirror_luminance(config, wi, wr)[:, None]
+    mirror = config.radiometry.mirror_luminance(wi, wr)[:, None]
     return found / mirror, expected / mirror
 
 
@@ -82,7 +80,7 @@ def test_a_table_without_symmetry_is_looked_up_alike() -> None:
     textures = whole(table)
     planes = [np.moveaxis(textures.values[:, 4 * q : 4 * q + 4], 1, -1) for q in range(textures.count)]
     page = evaluate.PolarTable(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
-    np.testing.assert_allclose(page.value(*uvw), polar.look_up(table, uvw.T), atol=2e-4)
+    np.testing.assert_allclose(page.value(*uvw), table.look_up(uvw.T), atol=2e-4)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -113,7 +111,7 @@ def test_a_shaders_table_of_the_metal_is_as_exact_as_told(normalisation: str) ->
     assert entry.reflectance_table is not None
     assert medium is not None
     wi, wr = random_pairs(None, 2000, SEED)
-    exact = brdf.direction_factor(config.material, trapezoid(config.spectrum, 5.0), wi, wr)
+    exact = brdf.direction_factor(config.material, trapezoid(config.light, 5.0), wi, wr)
     exact /= brdf.geometry_factor(config.material, wi, wr)
     shader = np.interp(geometry.cos_half(wi, wr), *material.reflectance_table(medium)) / entry.divisor
     error = np.abs(shader - exact).max() * entry.divisor

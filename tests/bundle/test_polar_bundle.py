@@ -77,8 +77,8 @@ def test_the_mapping_told_is_the_grids(bake: Baker, bundle: Path) -> None:
 def test_the_manifest_tells_certificate_plan_and_stages(bake: Baker, bundle: Path) -> None:
     inputs, told = bake(small("polar")), manifest_of(bundle)
     assert told.certificate == CertificateEntry.model_validate(inputs["table"].summary["certificate"])
-    assert (told.plan["w_terms"], told.plan["windows"]) == (12, inputs["spectrum"].summary["windows"])
-    assert list(told.provenance.artifacts) == ["surface", "spectrum", "table", "render", "validate"]
+    assert (told.plan["w_terms"], told.plan["windows"]) == (12, inputs["power_spectrum"].summary["windows"])
+    assert list(told.provenance.artifacts) == ["surface", "power_spectrum", "table", "render", "validate"]
     assert told.made_by.stages.keys() == told.provenance.artifacts.keys()
     assert told.colour.step_nm is None
     assert told.colour.wavelengths == inputs["table"].summary["wavelengths"]
@@ -119,7 +119,7 @@ def test_a_bundle_errs_as_it_says(
     with OpenEXR.File(str(folder / told.tables[-1].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
-    table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar"))
+    table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
     evaluate = bundle_evaluator(folder)
     mirror = wi * [-1.0, -1.0, 1.0]
     for views, error in ((wr, loss_of(told).added), (mirror, loss_of(told).added_in_mirror)):

@@ -67,7 +67,7 @@ def test_a_half_bundle_errs_as_it_says(bake: Baker, tmp_path: Path) -> None:
     with OpenEXR.File(str(folder / told.tables[0].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(np.float16)}
     wi, wr = random_pairs(None, 2000, taylor_half._SEED)
-    exact = table_evaluator(taylor_table.load(inputs["table"]), config)
+    exact = table_evaluator(taylor_table.load(inputs["table"]), config.radiometry)
     evaluate = bundle_evaluator(folder)
     mirrored = wi * [-1.0, -1.0, 1.0]
     loss = told.storage_loss

@@ -57,7 +57,7 @@ def test_every_criterion_has_a_verdict(benched: tuple[Tool, Result]) -> None:
 
 def test_shares_are_shares(benched: tuple[Tool, Result]) -> None:
     timed = benched[1].json["surfaces"][0]["timed"]
-    assert {"stack", "spectrum", "apply_operator", "paper table"} <= {stage["stage"] for stage in timed}
+    assert {"stack", "power spectrum", "apply_operator", "paper table"} <= {stage["stage"] for stage in timed}
     assert all(0.0 < stage["bound_share"] < 1.5 for stage in timed)
 
 

@@ -12,7 +12,7 @@ from tests.cli.tool import SMALL, Tool, leavings, toml
 
 pytestmark = pytest.mark.slow
 
-STAGES = ["surface", "spectrum", "table", "render", "validate"]
+STAGES = ["surface", "power_spectrum", "table", "render", "validate"]
 POLAR: dict[str, Any] = {
     **SMALL,
     "surface": {"recipe": {"kind": "elaphe", "size_um": 10, "pitch_um": 0.1}},
@@ -87,16 +87,16 @@ def test_a_second_illuminant_reuses_the_power_spectrum(polar: Tool) -> None:
     told = states(polar, write(polar, spectrum={"illuminant": "A"}))
     assert [told[stage] for stage in STAGES] == ["cached", "cached", "to do", "to do", "to do"]
     observer = "CIE 1964 10 Degree Standard Observer"
-    assert states(polar, write(polar, spectrum={"observer": observer}))["spectrum"] == "cached"
+    assert states(polar, write(polar, spectrum={"observer": observer}))["power_spectrum"] == "cached"
     material = {"fresnel": "conductor", "metal": "Au"}
-    assert states(polar, write(polar, material=material))["spectrum"] == "cached"
-    assert states(polar, write(polar, spectrum={"range_nm": [480, 600]}))["spectrum"] == "to do"
+    assert states(polar, write(polar, material=material))["power_spectrum"] == "cached"
+    assert states(polar, write(polar, spectrum={"range_nm": [480, 600]}))["power_spectrum"] == "to do"
 
 
 def test_a_run_may_stop_at_the_certified_table(tool: Tool) -> None:
     result = tool("run", write(tool), "--until", "table")
     assert result.code == 0
-    assert sorted(tool.artifacts()) == ["spectrum", "surface", "table"]
+    assert sorted(tool.artifacts()) == ["power_spectrum", "surface", "table"]
     assert not tool.out.exists()
     assert "on 2000 random directions, 0.5 allowed" in result.stdout
     told = tool("run", write(tool), "--until", "table", "--json").json[0]["stages"]["table"]["summary"]

@@ -102,8 +102,8 @@ def test_every_config_and_every_key_is_told() -> None:
 
     for path in (REPOSITORY / "configs").glob("*.toml"):
         assert f"`{path.stem}`" in USAGE or f"configs/{path.name}" in USAGE
-    for name, field in Config.model_fields.items():
-        section = field.annotation
+    for key, field in Config.model_fields.items():
+        name, section = field.alias or key, field.annotation
         if name in ("name", "scene"):
             continue
         row = next(line for line in USAGE.splitlines() if line.startswith(f"| `[{name}]`"))

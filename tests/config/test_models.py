@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config.models import Config, PolarLayout, as_pair
+from pipeline.config.models import Config
 from pipeline.config.read import load, parse
 from pipeline.errors import ConfigError
 from pipeline.stages.render import map_name
+from pipeline.tables.polar.layout import PolarLayout
+from pipeline.validated import as_pair
 
 MINIMAL = {"name": "a", "surface": {"recipe": {"kind": "mirror"}}}
 
@@ -40,9 +42,9 @@ def test_left_out_sections_take_their_documented_defaults(tmp_path):
     """A name and a surface are enough; all else is as the reference says."""
     config = read(tmp_path, 'name = "a"\n[surface]\nrecipe = { kind = "mirror" }\n')
     assert (config.coherence.sigma_um, config.coherence.boundary) == (16.25, "periodic")
-    assert config.spectrum.illuminant == "D65"
-    assert config.spectrum.observer == "CIE 1931 2 Degree Standard Observer"
-    assert config.spectrum.range_nm == (380.0, 780.0)
+    assert config.light.illuminant == "D65"
+    assert config.light.observer == "CIE 1931 2 Degree Standard Observer"
+    assert config.light.range_nm == (380.0, 780.0)
     assert (config.material.fresnel, config.material.ior, config.material.metal) == ("schlick", 1.5, "Au")
     assert (config.material.shadowing, config.material.normalisation) == (True, "relative")
     assert config.table == PolarLayout(terms="auto", rings="auto", azimuths="auto", w_terms="auto")
@@ -93,7 +95,7 @@ def test_the_documented_sections_are_read(tmp_path):
     assert (config.surface.pitch_um, config.surface.clip_percentile) == ((0.0488, 0.05), (0.05, 99.9))
     assert (config.surface.levelling, config.surface.height_unit) == ("rows", "nm")
     assert config.coherence.sigma_um == 10.0
-    assert config.spectrum.illuminant.lambda_nm == 532.0
+    assert config.light.illuminant.lambda_nm == 532.0
     assert (config.material.fresnel, config.material.shadowing) == ("conductor", False)
     assert (config.table.resolution, config.table.terms) == (101, 25)
     assert config.scene.views.theta_max_deg == 60.0
@@ -129,7 +131,7 @@ def test_files_are_relative_to_the_config_and_not_to_the_caller(tmp_path, monkey
     )
     monkeypatch.chdir(elsewhere)
     config = load(Path("../configs/a.toml"))
-    found = (config.surface.path, config.spectrum.illuminant, config.material.metal)
+    found = (config.surface.path, config.light.illuminant, config.material.metal)
     assert found == tuple(str(tmp_path.resolve() / name) for name in ("scan.csv", "light.csv", "metal.csv"))
 
 
@@ -280,7 +282,7 @@ def test_matching_functions_that_give_no_xyz_are_no_observer(observer):
     """Responses of cones or RGB primaries would be taken for XYZ."""
     assert list(faults(with_section("spectrum", observer=observer))) == ["spectrum.observer"]
     other = with_section("spectrum", observer="CIE 2015 2 Degree Standard Observer")
-    assert parse(other, "f", Path()).spectrum.observer.startswith("CIE 2015")
+    assert parse(other, "f", Path()).light.observer.startswith("CIE 2015")
 
 
 def scene_and_render(scene, render):

@@ -6,15 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import jv
 
-from pipeline.config.models import LaserLine, Spectrum
 from pipeline.diffraction.expansion import chebyshev_order, float32_rounding, largest_phase, plan_taylor
 from pipeline.errors import AccuracyError
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import LaserLine, Light, trapezoid
 from pipeline.surface.heightfield import HeightField
 
 pytestmark = pytest.mark.physics
 
-LASER = trapezoid(Spectrum(illuminant=LaserLine(lambda_nm=500.0)), 1.0)
+LASER = trapezoid(Light(illuminant=LaserLine(lambda_nm=500.0)), 1.0)
 T = np.linspace(-1.0, 1.0, 401)
 
 
@@ -92,7 +91,7 @@ def test_float32_rounding_grows_with_height(half_range_um, factor):
 def test_float32_rounding_grows_towards_short_wavelengths():
     """Blue sees more phase in the same height; red light that no Z receives has a loss all the same."""
     blue, red = (
-        float32_rounding(field(0.2), trapezoid(Spectrum(illuminant=LaserLine(lambda_nm=nm)), 1.0))
+        float32_rounding(field(0.2), trapezoid(Light(illuminant=LaserLine(lambda_nm=nm)), 1.0))
         for nm in (420.0, 780.0)
     )
     assert blue > red

@@ -8,7 +8,7 @@ import pytest
 
 from kernels import device
 from pipeline.accuracy.checks import relative_error
-from pipeline.config.models import Coherence, Config, Material, Mirror, PolarLayout, Spectrum, Surface
+from pipeline.config.models import Config
 from pipeline.evaluation.speed import machine, memory, nufft, plain, polar_bake, setting, transforms, work
 from pipeline.evaluation.speed.criteria import Criterion
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
@@ -16,7 +16,13 @@ from pipeline.evaluation.speed.polar_bake import Stages
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of
 from pipeline.evaluation.speed.truth import MapTruth
+from pipeline.optics.coherence import Coherence
+from pipeline.optics.light import Light
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Mirror
+from pipeline.surface.source import SurfaceSource
+from pipeline.tables.polar.layout import PolarLayout
 
 pytestmark = pytest.mark.slow
 
@@ -24,8 +30,8 @@ SIGMA_UM = 2.0
 
 
 def config(**sections: object) -> Config:
-    base = {"coherence": Coherence(sigma_um=SIGMA_UM), "spectrum": Spectrum(range_nm=(520.0, 560.0))}
-    return Config(name="small", surface=Surface(recipe=Mirror(kind="mirror")), **{**base, **sections})
+    base = {"coherence": Coherence(sigma_um=SIGMA_UM), "spectrum": Light(range_nm=(520.0, 560.0))}
+    return Config(name="small", surface=SurfaceSource(recipe=Mirror(kind="mirror")), **{**base, **sections})
 
 
 def rough(pitch_um: tuple[float, float] = (0.1, 0.11), rows: int = 64) -> HeightField:
@@ -51,7 +57,7 @@ def case(request: pytest.FixtureRequest) -> Setting:
 def test_plain_numpy_gives_the_samples(case: Setting) -> None:
     """One texel after the other, from the same stack: what is left is E's interpolation."""
     built = case.stack()
-    samples = case.samples(case.spectrum(built))
+    samples = case.samples(case.power_spectrum(built))
     coefficients = plain.complex_coefficients(built)
     rho, phi = case.plan.rings.rho(), case.plan.azimuths.angles()
     for ring, azimuth in ((0, 5), (7, 40), (15, 90), (23, 61)):
@@ -64,7 +70,7 @@ def test_plain_numpy_gives_the_samples(case: Setting) -> None:
 
 def test_nufft_gives_the_samples(case: Setting) -> None:
     pytest.importorskip("finufft")
-    samples = case.samples(case.spectrum(case.stack()))
+    samples = case.samples(case.power_spectrum(case.stack()))
     routed = nufft.run(case, 48, 1)
     # all of half a turn; the other half follows, for heights are real
     error = relative_error(routed.samples.astype(float), samples, 1e-4 * samples.max())
@@ -106,21 +112,21 @@ def test_a_bake_is_timed_kernel_by_kernel() -> None:
     assert baked.second_light_s is not None
     assert [timed.work.stage for timed in polar_bake.stages(made, baked)] == [
         "stack",
-        "spectrum",
+        "power spectrum",
         "build_operator",
         "apply_operator",
         "splines",
     ]
 
 
-def test_the_spectrum_needs_what_its_loops_do() -> None:
+def test_the_power_spectrum_needs_what_its_loops_do() -> None:
     """Per radius and azimuth of half a turn: every tap of every term, complex, and every term at every node in s."""
     field, chosen = CASES["plain"]
     made = setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
     built = made.stack()
     taps = (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
     per_pair = 2 * (taps * 2 * built.terms + 2 * built.terms * made.plan.s_nodes)
-    found = work.spectrum(made, built, made.spectrum(built))
+    found = work.power_spectrum(made, built, made.power_spectrum(built))
     assert found.flops == per_pair * len(made.radius_per_um) * 48
     assert built.terms <= built.coefficients.shape[3]
 
@@ -186,7 +192,7 @@ def test_the_map_tells_a_good_table_from_a_bad_one() -> None:
     errors = []
     for rings, azimuths in ((16, 64), (80, 512)):
         made = setting.make(field, chosen, PolarLayout(rings=rings, azimuths=azimuths))
-        errors.append(truth.error(made.table(made.spectrum(made.stack()), made.light)).mean)
+        errors.append(truth.error(made.table(made.power_spectrum(made.stack()), made.light)).mean)
     assert errors[1] < 0.3
     assert errors[0] > 5.0 * errors[1]
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.reference import power_direct
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.stability import judging, series_way, sweep, table_way
@@ -74,8 +73,8 @@ def test_chebyshev_holds(height_um: float, precision: Precision) -> None:
 
 def test_too_few_terms_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The order is taken for a phase two thirds as large: what is left out is what the sweep sees."""
-    order = series.chebyshev_order
-    monkeypatch.setattr(series, "chebyshev_order", lambda z, _tolerance: order(0.66 * z, 0.1))
+    order = expansion.chebyshev_order
+    monkeypatch.setattr(expansion, "chebyshev_order", lambda z, _tolerance: order(0.66 * z, 0.1))
     assert judging.judge(NOISE).verdict == "wrong"
     assert judging.judge(replace(DEVICE, precision="float64")).verdict == "wrong"
 
@@ -94,7 +93,7 @@ def test_a_crash_is_no_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
     def crash(*_: object, **__: object) -> None:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr(stack, "build", crash)
+    monkeypatch.setattr(dft_stack, "build", crash)
     outcome = judging.judge(NOISE)
     assert (outcome.verdict, outcome.message) == ("wrong", "ZeroDivisionError: float division by zero")
 
@@ -111,8 +110,8 @@ def test_a_refusal_is_one() -> None:
 
 def test_a_taylor_plan_that_refuses_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the paper's table is refused its digits are gone: without the refusal they would be silently wrong."""
-    plan = series.plan_taylor
-    monkeypatch.setattr(series, "float32_rounding", lambda *_: 0.0)
+    plan = expansion.plan_taylor
+    monkeypatch.setattr(expansion, "float32_rounding", lambda *_: 0.0)
     assert plan(replace(DEVICE, height_um=0.6).field(), one_wavelength(380.0), 1e-4).order > 30
     assert judging.judge(replace(DEVICE, basis="taylor", height_um=0.6)).verdict == "wrong"
 

@@ -7,10 +7,10 @@ import pyfftw
 import pytest
 import scipy.fft
 
-from pipeline.config.models import Elaphe, GaussianRandom
 from pipeline.fourier import backend
 from pipeline.surface import recipes, statistics
 from pipeline.surface.recipes import random, snakes
+from pipeline.surface.recipes.parameters import Elaphe, GaussianRandom
 
 PLAIN = SimpleNamespace(
     fft=scipy.fft.fft,

@@ -7,18 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config.models import LaserLine, Material, Spectrum
 from pipeline.optics import brdf, fresnel, geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import LaserLine, Light, trapezoid
+from pipeline.optics.material import Material
 from tests.optics.directions import directions, tilted
 
 SIGMA_UM = 16.25
 LAMBDA_NM = 550.0
-LASER = Spectrum(illuminant=LaserLine(lambda_nm=LAMBDA_NM))
+LASER = Light(illuminant=LaserLine(lambda_nm=LAMBDA_NM))
 NORMAL = np.array([0.0, 0.0, 1.0])
 FRESNEL = ("none", "schlick", "dielectric", "conductor")
-WHITE = trapezoid(Spectrum(), 20.0)
+WHITE = trapezoid(Light(), 20.0)
 
 
 def materials(**fixed):
@@ -31,11 +32,11 @@ def materials(**fixed):
     ]
 
 
-@pytest.mark.parametrize("spectrum", [Spectrum(), Spectrum(illuminant="A"), LASER], ids=["D65", "A", "laser"])
+@pytest.mark.parametrize("spectrum", [Light(), Light(illuminant="A"), LASER], ids=["D65", "A", "laser"])
 @pytest.mark.parametrize("material", materials(normalisation="relative"), ids=str)
 def test_relative_mirror_at_normal_incidence_is_1_ru(material, spectrum):
     """|P|^2 = 1 seen along the normal has Y = 1, whatever it is made of: that is 1 RU."""
-    quadrature = brdf.integrand(material, spectrum, SIGMA_UM, 5.0)
+    quadrature = Radiometry(spectrum, material, SIGMA_UM).integrand(5.0)
     factor = brdf.direction_factor(material, trapezoid(spectrum, 5.0), NORMAL, NORMAL)
     assert factor * quadrature.weights[:, 1].sum() == pytest.approx(1.0, rel=1e-12)
 
@@ -121,8 +122,8 @@ def test_metal_separates_exactly_at_one_wavelength(wi, wr, normalisation):
 def test_metal_keeps_its_colour_at_normal_incidence():
     """The spectral factor of gold is its reflectance at every wavelength, and white light turns yellow."""
     material = Material(fresnel="conductor", normalisation="relative")
-    spectrum = Spectrum()
-    gold = brdf.integrand(material, spectrum, SIGMA_UM, 5.0)
+    spectrum = Light()
+    gold = Radiometry(spectrum, material, SIGMA_UM).integrand(5.0)
     index = fresnel.metal_index("Au", gold.lambda_nm)
     ratio = brdf.spectral_factor(material, trapezoid(spectrum, 5.0), SIGMA_UM) / fresnel.reflectance(1.0, index)
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)

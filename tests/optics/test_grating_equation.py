@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import Blazed
 from pipeline.diffraction.reference import power_direct
 from pipeline.optics import geometry
 from pipeline.optics.grating_equation import in_plane, period_um, viewing_angle
 from pipeline.surface import recipes
+from pipeline.surface.recipes.parameters import Blazed
 
 THETA_I = np.radians(75.0)
 

@@ -1,18 +1,18 @@
 """Plans that keep their budget, and certificates that say whether they did."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.accuracy import certificate
+from pipeline.accuracy.exact import reference_of
 from pipeline.config.models import Config
 from pipeline.config.read import parse
-from pipeline.diffraction import power_spectrum as spectrum
-from pipeline.diffraction.reference import MeanReference, reference_of
+from pipeline.diffraction import power_spectrum
+from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
-from pipeline.optics import brdf, geometry
+from pipeline.optics import geometry
 from pipeline.surface import recipes, windows
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
@@ -44,11 +44,11 @@ def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
     budget = plan.Budget(found.budget_delta_e, found.accuracy.exposure_ru)
     sigma = found.coherence.sigma_um
     power, chosen = plan.make(
-        windows.places(field_of(found), found.coherence), sigma, found.spectrum, found.scene, budget, found.table
+        windows.places(field_of(found), found.coherence), sigma, found.light, found.scene, budget, found.table
     )
 
-    rules = quadrature.choose(brdf.illumination_of(found), chosen.rings.rho(), sigma, budget.quadrature)
-    reflectance = partial(brdf.spectral_reflectance, found.material, found.spectrum)
+    rules = quadrature.choose(found.radiometry.illumination, chosen.rings.rho(), sigma, budget.quadrature)
+    reflectance = found.radiometry.reflectance
     return polar.build(power, chosen.rings, rules, chosen.w_terms, reflectance), chosen
 
 
@@ -56,7 +56,7 @@ def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
 def test_a_plan_keeps_its_budget_on_directions_it_never_saw(delta_e: float) -> None:
     found = config(accuracy={"delta_e": delta_e})
     table, _ = planned(found)
-    certified = certificate.certify(table_evaluator(table, found), exact_of(found), found)
+    certified = certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found)
     assert certified.measured <= delta_e
     assert certified.random.directions == 2000
     assert certified.reference.maximum < 1e-6
@@ -90,14 +90,14 @@ def test_a_flat_mirror_is_planned_for_its_lobe() -> None:
     recipe = {"kind": "mirror", "size_um": 6.4, "pitch_um": 0.1}
     found = config(surface={"recipe": recipe}, coherence={"sigma_um": 1.6}, accuracy={"delta_e": 0.5})
     table, _ = planned(found)
-    assert certificate.certify(table_evaluator(table, found), exact_of(found), found).measured <= 0.5
+    assert certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found).measured <= 0.5
 
 
 def test_a_table_that_misses_its_budget_gets_no_certificate() -> None:
     found = config(table={"rings": 12, "azimuths": 32})
     table, _ = planned(found)
     with pytest.raises(AccuracyError, match=r"misses its budget.*accuracy\.delta_e allows 0\.1"):
-        certificate.certify(table_evaluator(table, found), exact_of(found), found)
+        certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found)
 
 
 def test_a_budget_missed_beside_a_coarse_pitch_names_it() -> None:
@@ -107,7 +107,7 @@ def test_a_budget_missed_beside_a_coarse_pitch_names_it() -> None:
         found = config(surface={"recipe": recipe}, table={"rings": 12, "azimuths": 32})
         table, _ = planned(found)
         with pytest.raises(AccuracyError) as missed:
-            certificate.certify(table_evaluator(table, found), exact_of(found), found)
+            certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found)
         assert ("bright at 5 per um" in str(missed.value)) == named
 
 
@@ -115,7 +115,7 @@ def test_the_certificate_sees_a_table_turned_the_wrong_way() -> None:
     """A sign that mirrors every blaze is no small error."""
     found = config(surface={"recipe": {"kind": "blazed", "size_um": 12, "pitch_um": 0.1}})
     table, _ = planned(found)
-    evaluate = table_evaluator(table, found)
+    evaluate = table_evaluator(table, found.radiometry)
     certificate.certify(evaluate, exact_of(found), found)
     with pytest.raises(AccuracyError, match="misses"):
         certificate.certify(lambda wi, wr: evaluate(wi * [-1, 1, 1], wr * [-1, 1, 1]), exact_of(found), found)
@@ -129,14 +129,14 @@ def test_a_scene_bounds_the_rings() -> None:
     assert chosen.rings.rho_max == pytest.approx(reach)
     wi = geometry.direction(np.radians([30.0, 80.0]), 0.0)
     wr = geometry.direction(np.radians([39.9, 80.0]), 0.0)
-    assert list(np.isfinite(table_evaluator(table, found)(wi, wr)).all(axis=-1)) == [True, False]
-    certificate.certify(table_evaluator(table, found), exact_of(found), found)
+    assert list(np.isfinite(table_evaluator(table, found.radiometry)(wi, wr)).all(axis=-1)) == [True, False]
+    certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found)
 
 
 def test_a_laser_line_is_kept_too() -> None:
     found = config(spectrum={"illuminant": {"lambda_nm": 633.0}}, accuracy={"delta_e": 0.5})
     table, _ = planned(found)
-    assert certificate.certify(table_evaluator(table, found), exact_of(found), found).measured <= 0.5
+    assert certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found).measured <= 0.5
 
 
 @pytest.mark.parametrize("normalisation", ["relative", "absolute"])
@@ -144,7 +144,7 @@ def test_gold_is_integrated_with_its_own_reflectance(normalisation: str) -> None
     material = {"fresnel": "conductor", "metal": "Au", "normalisation": normalisation}
     found = config(material=material, accuracy={"delta_e": 0.3})
     table, _ = planned(found)
-    assert certificate.certify(table_evaluator(table, found), exact_of(found), found).measured <= 0.3
+    assert certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found).measured <= 0.3
 
 
 def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
@@ -152,7 +152,7 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
     for angle in (0.0, 35.0, 90.0):
         along = x * np.cos(np.radians(angle)) + y * np.sin(np.radians(angle))
         field = HeightField(0.05 * np.cos(2.0 * np.pi * along / 1.2), (0.1, 0.1))
-        stretch, axis = scattering.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
+        stretch, axis = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
         apart = np.angle(np.exp(2j * (axis - np.radians(angle)))) / 2.0
         assert abs(np.degrees(apart)) < 2.0
         # seams of a turned grating scatter too
@@ -162,5 +162,5 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
 def test_an_isotropic_surface_is_not_stretched() -> None:
     rng = np.random.default_rng(4)
     field = HeightField(rng.normal(0.0, 0.03, (120, 120)), (0.1, 0.1))
-    stretch, _ = scattering.anisotropy(spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
+    stretch, _ = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
     assert stretch > 0.95

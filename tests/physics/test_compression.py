@@ -1,20 +1,19 @@
 """Few textures: a basis that dim texels share, an envelope that half floats hold, and the targets on real scans."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
-from pipeline.config.models import Material, Spectrum
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.reference import Reference
 from pipeline.optics import brdf, geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import Light, trapezoid
+from pipeline.optics.material import Material
 from pipeline.tables.evaluate import Map
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
@@ -46,7 +45,7 @@ def directions(count: int = 3000) -> Array:
 
 def look_up(textures: Textures, uvw: Array) -> Array:
     g = textures.envelope.at(np.hypot(uvw[:, 0], uvw[:, 1]))
-    return g[:, None] * polar.look_up(textures.table(), uvw)
+    return g[:, None] * textures.table().look_up(uvw)
 
 
 def test_samples_are_what_coefficients_stand_for() -> None:
@@ -62,7 +61,7 @@ def test_samples_are_the_look_up_at_the_nodes() -> None:
     rho, phi = GRID.rings.rho()[ring].ravel(), GRID.azimuths.angles()[azimuth].ravel()
     # |w| = w_max makes every Chebyshev polynomial 1
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), -np.sqrt(4.0 - np.minimum(rho, 1.99999) ** 2)], axis=-1)
-    found = polar.look_up(PolarTable(values.reshape(24, 3, 4, 96), GRID), uvw)
+    found = PolarTable(values.reshape(24, 3, 4, 96), GRID).look_up(uvw)
     expected = samples(values).reshape(24, 3, 4, 96).sum(axis=2)
     # at rho = 0 there is no azimuth to be asked for
     np.testing.assert_allclose(found.reshape(24, 96, 3)[1:], np.moveaxis(expected, 1, 2)[1:], atol=2e-5)
@@ -134,22 +133,22 @@ def test_flattening_changes_no_value_and_saves_digits() -> None:
     plain = np.abs(table.values)
     assert np.ptp(np.log10(np.abs(flat.values).max(axis=(1, 2)))) < 0.2 * np.ptp(np.log10(plain.max(axis=(1, 2, 3))))
     uvw = directions()
-    expected = polar.look_up(table, uvw)
+    expected = table.look_up(uvw)
     # the spline of the flattened samples is another one between nodes, and the better one
     np.testing.assert_allclose(look_up(flat, uvw), expected, rtol=2e-2, atol=2e-3 * 1e-3)
     ring = GRID.rings.rho()[3:]
     nodes = np.stack([ring * np.cos(0.4), ring * np.sin(0.4), np.zeros_like(ring)], axis=-1)
-    np.testing.assert_allclose(look_up(flat, nodes), polar.look_up(table, nodes), rtol=1e-4)
+    np.testing.assert_allclose(look_up(flat, nodes), table.look_up(nodes), rtol=1e-4)
 
 
 def snake_table(name: str) -> tuple[PolarTable, Array, Array, Array]:
     """The table of 140 x 1792 texels of a scan, and views at normal incidence: uvw, C cos ti and exact XYZ."""
-    field, light, material, sigma = snake(name), Spectrum(), Material(), 16.25
-    radius = spectrum.radii(sigma, 2.0 / 0.38)
-    stack = spectrum.chebyshev_stack(field, sigma, radius[-1], 16, 1e-5)
-    power = spectrum.build(stack, Azimuths(1792, 0.87), radius, 380.0, 12)
+    field, light, material, sigma = snake(name), Light(), Material(), 16.25
+    radius = power_spectrum.radii(sigma, 2.0 / 0.38)
+    stack = power_spectrum.chebyshev_stack(field, sigma, radius[-1], 16, 1e-5)
+    power = power_spectrum.build(stack, Azimuths(1792, 0.87), radius, 380.0, 12)
     rings = Rings(140, 0.1)
-    rules = quadrature.choose(partial(brdf.integrand, material, light, sigma), rings.rho(), sigma, 3e-4)
+    rules = quadrature.choose(Radiometry(light, material, sigma).integrand, rings.rho(), sigma, 3e-4)
     # every 29th pixel of the map over which this project states colour errors
     wr = Map(301, 0.98).views()[::29]
     wi = np.broadcast_to([0.0, 0.0, 1.0], wr.shape)
@@ -172,7 +171,7 @@ def mirror_error(stored: Textures, table: PolarTable) -> float:
     """Mean CIELAB error in mirror directions at 1 RU, which random directions hardly see."""
     w = -np.linspace(0.5, 2.0, 40)
     uvw = np.stack([np.zeros(40), np.zeros(40), w], axis=-1)
-    return float(delta_e(look_up(stored, uvw), polar.look_up(table, uvw), 1.0).mean())
+    return float(delta_e(look_up(stored, uvw), table.look_up(uvw), 1.0).mean())
 
 
 @pytest.mark.slow

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from pipeline.config.models import Blazed, Rectangular, Sinusoid
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Blazed, Rectangular, Sinusoid
 
 PERIOD, SIGMA = 2.5, 6.0
 NM = 550.0

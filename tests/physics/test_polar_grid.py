@@ -6,7 +6,7 @@ from scipy.ndimage import spline_filter1d
 
 from kernels import cubic_spline
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
-from pipeline.tables.polar.table import PolarTable, look_up
+from pipeline.tables.polar.table import PolarTable
 
 GRIDS = [Azimuths(64), Azimuths(96, 0.4, 0.3), Azimuths(32, 0.7, -1.5)]
 
@@ -84,7 +84,7 @@ def test_a_smooth_function_comes_back_everywhere_and_at_the_origin(azimuths: Azi
         phi = rng.uniform(-np.pi, np.pi, 400)
         uvw = directions(np.full(400, rho), phi, 0.7)
         expected = function(uvw[:, 0], uvw[:, 1])
-        found = look_up(table, uvw)
+        found = table.look_up(uvw)
         np.testing.assert_allclose(found[:, 0], expected, atol=tolerance)
         np.testing.assert_allclose(found[:, 1], 2.0 * expected, atol=2.0 * tolerance)
         np.testing.assert_allclose(found[:, 2], 0.7 * expected, atol=tolerance)
@@ -92,7 +92,7 @@ def test_a_smooth_function_comes_back_everywhere_and_at_the_origin(azimuths: Azi
 
 def test_beyond_the_last_ring_nothing_is_known_and_on_it_all() -> None:
     table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1, 1.5))
-    inside, outside = look_up(table, directions(np.array([1.5, 1.51]), np.zeros(2), 0.5))
+    inside, outside = table.look_up(directions(np.array([1.5, 1.51]), np.zeros(2), 0.5))
     np.testing.assert_allclose(inside, [1.0, 2.0, 0.5], rtol=1e-5)
     assert np.all(np.isnan(outside))
 
@@ -100,6 +100,6 @@ def test_beyond_the_last_ring_nothing_is_known_and_on_it_all() -> None:
 def test_the_rim_and_vanishing_w_are_ordinary() -> None:
     table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1))
     uvw = np.array([[2.0, 0.0, 0.0], [0.0, -2.0, -1e-12], [1.2, 0.0, -1e-300], [0.0, 0.0, -2.0]])
-    found = look_up(table, uvw)
+    found = table.look_up(uvw)
     assert np.all(np.isfinite(found))
     np.testing.assert_allclose(found[:, 0], 1.0, rtol=1e-5)

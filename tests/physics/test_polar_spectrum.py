@@ -1,24 +1,21 @@
 """E(r, phi, s) against sums over samples, and the spectral operator against the reference's integral."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from pipeline.config.models import LaserLine, Material, Spectrum
-from pipeline.diffraction import expansion as series
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
-from pipeline.optics import brdf
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.brdf import Radiometry
+from pipeline.optics.light import LaserLine, Light, Quadrature, trapezoid
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import line_points, quadrature, spectral, spectral_integral
 from pipeline.tables.polar import table as polar
 
 SIGMA = 2.0
-LIGHT = Spectrum()
+LIGHT = Light()
 
 
 def rough(ny: int = 120, nx: int = 90, height: float = 0.1, pitch: tuple[float, float] = (0.1, 0.09)) -> HeightField:
@@ -27,13 +24,13 @@ def rough(ny: int = 120, nx: int = 90, height: float = 0.1, pitch: tuple[float, 
 
 
 def spectrum_of(
-    field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0, spacing: float = spectrum.SPACING
-) -> spectrum.PolarSpectrum:
-    z = series.largest_phase(field.half_range_um, lambda_min_nm)
-    terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
-    radius = spectrum.radii(SIGMA, 2e3 / lambda_min_nm, spacing)
-    built = spectrum.chebyshev_stack(field, SIGMA, radius[-1], terms, 1e-6)
-    return spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
+    field: HeightField, azimuths: Azimuths, lambda_min_nm: float = 380.0, spacing: float = power_spectrum.SPACING
+) -> power_spectrum.PolarPowerSpectrum:
+    z = expansion.largest_phase(field.half_range_um, lambda_min_nm)
+    terms, nodes = (expansion.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-6, 1e-5))
+    radius = power_spectrum.radii(SIGMA, 2e3 / lambda_min_nm, spacing)
+    built = power_spectrum.chebyshev_stack(field, SIGMA, radius[-1], terms, 1e-6)
+    return power_spectrum.build(built, azimuths, radius, lambda_min_nm, nodes)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.6])
@@ -74,7 +71,9 @@ def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
 RHO = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.13, 1.16, 1.9, 1.95, 2.0])
 
 
-def integral_error(field: HeightField, power: spectrum.PolarSpectrum, rule: Quadrature, w_terms: int) -> float:
+def integral_error(
+    field: HeightField, power: power_spectrum.PolarPowerSpectrum, rule: Quadrature, w_terms: int
+) -> float:
     """The largest difference between rings' integrals and the reference's, over the mean and what is there."""
     terms = spectral_integral.integrate(
         power.values,
@@ -111,14 +110,14 @@ def test_a_ring_holds_the_integral_over_wavelengths(
     """Nodes of w by eight and by four. A narrow range averages less of what the radii's distance leaves."""
     field = rough()
     power = spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
-    assert integral_error(field, power, trapezoid(Spectrum(range_nm=range_nm), 5.0), w_terms) < tolerance
+    assert integral_error(field, power, trapezoid(Light(range_nm=range_nm), 5.0), w_terms) < tolerance
 
 
 @pytest.mark.parametrize("step_nm", [60.0, 20.0])
 def test_few_wavelengths_are_their_own_points(step_nm: float) -> None:
     """Nothing averages what interpolation leaves: radii are as near as for a line."""
-    field, light = rough(), Spectrum(range_nm=(500.0, 560.0))
-    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, spectrum.SPACING_OF_A_LINE)
+    field, light = rough(), Light(range_nm=(500.0, 560.0))
+    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, power_spectrum.SPACING_OF_A_LINE)
     rule = trapezoid(light, step_nm)
     rules = quadrature.uniform(rule, len(RHO))
     nodes = power.values.shape[2]
@@ -158,7 +157,7 @@ def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeyp
     material = Material(fresnel="conductor") if metal else Material()
     rules = quadrature.uniform(trapezoid(LIGHT, 5.0), rings.count)
     of = power.radius_per_um, power.s_max_per_um, rings.rho(), rules
-    nodes, reflectance = power.values.shape[2], partial(brdf.spectral_reflectance, material, LIGHT)
+    nodes, reflectance = power.values.shape[2], Radiometry(LIGHT, material, SIGMA).reflectance
     points = line_points.choose(of[0], nodes, *of[1:])
     assert points.rings.sum() == rings.count
     assert points.rings.max() == 8
@@ -179,7 +178,7 @@ def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeyp
 def test_wavelengths_follow_the_radius() -> None:
     """Near the mirror direction a few, at the rim many; and the estimate bounds what is measured."""
     rho, tolerance = Rings(40, 0.1).rho(), 1e-3
-    light = partial(brdf.integrand, Material(), LIGHT, 16.25)
+    light = Radiometry(LIGHT, Material(), 16.25).integrand
     rules = quadrature.choose(light, rho, 16.25, tolerance)
     assert np.all(np.diff(rules.count) >= 0)
     assert rules.count[0] <= 41
@@ -199,7 +198,7 @@ def test_wavelengths_follow_the_radius() -> None:
 
 def test_every_ring_keeps_the_white() -> None:
     """20 nm alone would miss a hundredth of Z's whole integral, in the mirror direction above all."""
-    light = partial(brdf.integrand, Material(), LIGHT, 16.25)
+    light = Radiometry(LIGHT, Material(), 16.25).integrand
     rules = quadrature.choose(light, Rings(40, 0.1).rho(), 16.25, 1e-3)
     white = light(0.05).weights.sum(axis=0)
     for first, count in zip(rules.first, rules.count, strict=True):
@@ -207,15 +206,15 @@ def test_every_ring_keeps_the_white() -> None:
 
 
 def test_a_laser_line_needs_one_wavelength() -> None:
-    light = Spectrum(illuminant=LaserLine(lambda_nm=532.0))
-    rules = quadrature.choose(partial(brdf.integrand, Material(), light, 16.25), np.arange(3.0), 16.25, 1e-3)
+    light = Light(illuminant=LaserLine(lambda_nm=532.0))
+    rules = quadrature.choose(Radiometry(light, Material(), 16.25).integrand, np.arange(3.0), 16.25, 1e-3)
     np.testing.assert_array_equal(rules.lambda_um, [0.532])
     np.testing.assert_array_equal(rules.count, [1, 1, 1])
 
 
 def test_a_window_too_wide_for_the_finest_step_is_refused() -> None:
-    with pytest.raises(AccuracyError, match="closer than"):
-        quadrature.choose(partial(brdf.integrand, Material(), LIGHT, 300.0), np.array([2.0]), 300.0, 1e-4)
+    with pytest.raises(AccuracyError, match="steps finer than"):
+        quadrature.choose(Radiometry(LIGHT, Material(), 300.0).integrand, np.array([2.0]), 300.0, 1e-4)
 
 
 def test_a_mirror_keeps_its_lobe() -> None:
@@ -229,13 +228,13 @@ def test_a_mirror_keeps_its_lobe() -> None:
     rho, phi = np.linspace(0.0, 0.3, 40), np.linspace(0.0, 6.0, 40)
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
     lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)
-    np.testing.assert_allclose(polar.look_up(table, uvw), lobe @ rule.weights, atol=3e-5)
+    np.testing.assert_allclose(table.look_up(uvw), lobe @ rule.weights, atol=3e-5)
 
 
 def test_the_spectral_form_answers_every_wavelength_without_integration() -> None:
     """Between all nodes, against sums over samples; the speckle's mean is what errors are held against."""
     field = rough(height=0.08)
-    power = spectrum_of(field, Azimuths(1536), spacing=spectrum.SPACING_OF_A_LINE)
+    power = spectrum_of(field, Azimuths(1536), spacing=power_spectrum.SPACING_OF_A_LINE)
     table = spectral.build(power)
     rng = np.random.default_rng(6)
     rho, phi, share = rng.uniform(0.05, 1.9, 60), rng.uniform(-np.pi, np.pi, 60), rng.uniform(0.1, 1.0, 60)

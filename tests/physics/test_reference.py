@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import LaserLine, Material, Spectrum
 from pipeline.diffraction.reference import Reference, power_direct, xyz_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import LaserLine, Light, trapezoid
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import Map
 
@@ -127,7 +127,7 @@ def test_what_a_direction_gets_does_not_depend_on_the_others() -> None:
 
 def test_what_is_beyond_the_band_is_left_out_of_an_integral() -> None:
     """XYZ of a direction whose short wavelengths are unknown is that of the others."""
-    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Spectrum(), Material()
+    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Light(), Material()
     wi, wr = np.array([[0.0, 0.0, 1.0]]), geometry.direction(np.array([np.radians(65.0)]), np.array([0.0]))
     rule = trapezoid(light, 1.0)
     power = Reference(field, 2.0, 380.0).power(geometry.uvw(wi, wr), rule.lambda_nm)
@@ -195,15 +195,15 @@ def test_exchanging_light_and_view_changes_nothing_but_the_cosine() -> None:
         Material(fresnel="conductor"),
         Material(fresnel="dielectric", normalisation="absolute"),
     ):
-        there = reference.xyz(Spectrum(), material, wi, wr, step_nm=20.0) / wi[:, 2:]
-        back = reference.xyz(Spectrum(), material, wr, wi, step_nm=20.0) / wr[:, 2:]
+        there = reference.xyz(Light(), material, wi, wr, step_nm=20.0) / wi[:, 2:]
+        back = reference.xyz(Light(), material, wr, wi, step_nm=20.0) / wr[:, 2:]
         np.testing.assert_allclose(there, back, rtol=1e-11)
 
 
 def test_spectral_integral_of_the_fast_route_is_that_of_the_direct_sum() -> None:
     """The whole chain at 1 nm, both routes, gold."""
     field, material = rough(24, 24, (0.1, 0.1), 0.1), Material(fresnel="conductor")
-    spectrum = Spectrum(range_nm=(500.0, 560.0))
+    spectrum = Light(range_nm=(500.0, 560.0))
     wi, wr = pairs(3)
     fast = Reference(field, 0.8, 500.0).xyz(spectrum, material, wi, wr)
     np.testing.assert_allclose(fast, xyz_direct(field, 0.8, spectrum, material, wi, wr), rtol=1e-8)
@@ -214,13 +214,13 @@ def test_a_mirror_seen_in_its_own_reflection_is_one_ru() -> None:
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
     straight = np.array([[0.0, 0.0, 1.0]])
     for fresnel in ("none", "schlick", "dielectric", "conductor"):
-        xyz = reference.xyz(Spectrum(), Material(fresnel=fresnel), straight, straight)
+        xyz = reference.xyz(Light(), Material(fresnel=fresnel), straight, straight)
         assert xyz[0, 1] == pytest.approx(1.0, abs=1e-12)
 
 
 def test_one_ru_is_a_mirror_in_either_normalisation() -> None:
     """A perfect mirror's peak BRDF is the unit of exposures: in it, absolute and relative are one for a laser."""
-    spectrum, straight = Spectrum(illuminant=LaserLine(lambda_nm=532.0)), np.array([[0.0, 0.0, 1.0]])
+    spectrum, straight = Light(illuminant=LaserLine(lambda_nm=532.0)), np.array([[0.0, 0.0, 1.0]])
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 532.0)
     wi, wr = pairs(20)
     found = []
@@ -245,7 +245,7 @@ def test_absolute_normalisation_gives_a_perfect_mirror_albedo_one(theta_deg: flo
     wr = np.stack([x.ravel(), y.ravel(), np.sqrt(1 - x.ravel() ** 2 - y.ravel() ** 2)], axis=-1)
     lit = np.broadcast_to(wi, wr.shape)
     material = Material(fresnel="none", shadowing=False, normalisation="absolute")
-    spectrum = Spectrum(illuminant="E", range_nm=(499.0, 501.0))
+    spectrum = Light(illuminant="E", range_nm=(499.0, 501.0))
     brdf = reference.xyz(spectrum, material, lit, wr)[:, 1] / wi[2]
     # d omega cos(tr) = du dv
     assert np.sum(brdf) * du * du == pytest.approx(1.0, abs=1e-3)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import Blazed, Direction, Scene, Sinusoid, Spectrum, Views
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.speed import plain_numpy
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.light import Light, Quadrature, trapezoid
+from pipeline.optics.scene import Direction, Scene, Views
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Blazed, Sinusoid
 from pipeline.tables.taylor import grid
 from pipeline.tables.taylor import table as taylor
 from tests.support import snake
@@ -19,11 +19,11 @@ from tests.support import snake
 TOLERANCE = 1e-4
 
 
-def made(field: HeightField, sigma: float, tolerance: float = TOLERANCE) -> tuple[stack.Stack, Quadrature]:
-    quadrature = trapezoid(Spectrum(), 5.0)
-    order = series.plan_taylor(field, quadrature, tolerance).order
-    reachable = series.W_MAX / 0.38
-    built = stack.build(field, "taylor", order + 1, sigma, reachable, stack.window_tolerance(tolerance))
+def made(field: HeightField, sigma: float, tolerance: float = TOLERANCE) -> tuple[dft_stack.Stack, Quadrature]:
+    quadrature = trapezoid(Light(), 5.0)
+    order = expansion.plan_taylor(field, quadrature, tolerance).order
+    reachable = expansion.W_MAX / 0.38
+    built = dft_stack.build(field, "taylor", order + 1, sigma, reachable, dft_stack.window_tolerance(tolerance))
     return built, quadrature
 
 
@@ -88,7 +88,7 @@ def test_whole_table_agrees_with_the_reference_in_all_four_quadrants() -> None:
     uv = np.stack([u[u_index], u[v_index]], axis=-1)
     w = -0.9 * np.sqrt(4.0 - np.sum(uv**2, axis=1))
     truth = np.nan_to_num(Reference(field, 2.0, 380.0).power(np.column_stack([uv, w]), quadrature.lambda_nm))
-    found = taylor.look_up(table, np.column_stack([uv, w]))
+    found = table.look_up(np.column_stack([uv, w]))
     np.testing.assert_allclose(found, truth @ quadrature.weights, rtol=1e-4, atol=1e-7)
     assert {(np.sign(a), np.sign(b)) for a, b in uv} >= {(1, 1), (1, -1), (-1, 1), (-1, -1)}
 
@@ -104,7 +104,7 @@ def test_look_up_between_nodes_is_bilinear_in_the_grid_coordinate() -> None:
     w = np.array([-1.1])
     expected = taylor.sum_powers(np.einsum("j,i,jicp->cp", wb, wa, corners)[None], w)
     uvw = np.array([[*grid.node_position(t, 2.0), w[0]]])
-    np.testing.assert_allclose(taylor.look_up(table, uvw), expected, rtol=1e-9)
+    np.testing.assert_allclose(table.look_up(uvw), expected, rtol=1e-9)
 
 
 def test_a_scene_skips_nodes_and_changes_none_it_keeps() -> None:
@@ -119,7 +119,7 @@ def test_a_scene_skips_nodes_and_changes_none_it_keeps() -> None:
     wi = np.array([0.0, np.sin(np.radians(30.0)), np.cos(np.radians(30.0))])
     for theta, reached in ((39.0, True), (60.0, False)):
         wr = np.array([-np.sin(np.radians(theta)), 0.0, np.cos(np.radians(theta))])
-        assert np.all(np.isfinite(taylor.look_up(part, (-wi - wr)[None]))) == reached
+        assert np.all(np.isfinite(part.look_up((-wi - wr)[None]))) == reached
 
 
 def test_what_the_scan_does_not_know_is_counted() -> None:
@@ -140,14 +140,14 @@ def test_predicted_rounding_foresees_what_float32_does(half_range: float) -> Non
     """An expected error: the worst of 200 nodes stays within three times of it, and it is no idle bound."""
     rng = np.random.default_rng(4)
     field = HeightField(rng.uniform(-half_range, half_range, (64, 64)), (0.1, 0.1))
-    quadrature = trapezoid(Spectrum(), 5.0)
-    plan = series.plan_taylor(field, quadrature, 1e3)
-    built = stack.build(field, "taylor", plan.order + 20, 2.0, series.W_MAX / 0.38, 1e-9)
+    quadrature = trapezoid(Light(), 5.0)
+    plan = expansion.plan_taylor(field, quadrature, 1e3)
+    built = dft_stack.build(field, "taylor", plan.order + 20, 2.0, expansion.W_MAX / 0.38, 1e-9)
     uv = rng.uniform(0.0, 0.6, (200, 2))
     w = -np.sqrt(4.0 - np.sum(uv**2, axis=1))
     i_p = taylor.node_values(built, quadrature, uv)
     exact, rounded = (taylor.sum_powers(values, w) for values in (i_p, i_p.astype(np.float32)))
-    error = np.abs(rounded - exact) / np.maximum(exact, series.MIRROR_SHARE * quadrature.weights.sum(axis=0))
+    error = np.abs(rounded - exact) / np.maximum(exact, expansion.MIRROR_SHARE * quadrature.weights.sum(axis=0))
     assert np.max(error) <= 3 * plan.rounding
     assert np.max(error) >= 1e-3 * plan.rounding
 
@@ -155,9 +155,9 @@ def test_predicted_rounding_foresees_what_float32_does(half_range: float) -> Non
 def test_tall_surfaces_are_refused_with_the_error_and_the_remedy() -> None:
     field = HeightField(np.random.default_rng(1).uniform(-0.5, 0.5, (64, 64)), (0.1, 0.1))
     with pytest.raises(AccuracyError, match=r"would err by .*tolerance asks for 1.0e-04.*clip_percentile"):
-        series.plan_taylor(field, trapezoid(Spectrum(), 5.0), 1e-4)
+        expansion.plan_taylor(field, trapezoid(Light(), 5.0), 1e-4)
 
 
 def test_too_few_terms_are_refused() -> None:
     with pytest.raises(AccuracyError, match=r'terms left out .*table.terms = "auto"'):
-        series.plan_taylor(small(), trapezoid(Spectrum(), 5.0), 1e-4, 5)
+        expansion.plan_taylor(small(), trapezoid(Light(), 5.0), 1e-4, 5)

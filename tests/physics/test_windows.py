@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import Coherence, LaserLine, Material, PolarLayout, Spectrum
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.reference import MeanReference, power_direct, xyz_direct
+from pipeline.optics.coherence import Coherence
+from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.material import Material
 from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import measure
 from pipeline.tables.planning import plan
+from pipeline.tables.polar.layout import PolarLayout
 
 SIGMA = 1.5
 
@@ -45,7 +48,7 @@ def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
         plan.make(
             windows.places(field, Coherence(sigma_um=SIGMA, windows=kind)),
             SIGMA,
-            Spectrum(),
+            Light(),
             None,
             plan.Budget(0.5, 7500.0),
             layout,
@@ -58,7 +61,7 @@ def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
     assert len(places) == 9
     direct = np.mean([power_direct(place, SIGMA, uvw, 1000.0) for place in places])
     assert many.values[0, 40, 3, 5] == pytest.approx(direct, rel=2e-3)
-    single, averaged = spectrum.speckle_contrast(one), spectrum.speckle_contrast(many)
+    single, averaged = power_spectrum.speckle_contrast(one), power_spectrum.speckle_contrast(many)
     # fully developed speckle has contrast 1; nine windows, two of three neighbours apart by half a width
     assert single == pytest.approx(1.0, abs=0.15)
     assert 0.08 < averaged < 0.35
@@ -67,7 +70,7 @@ def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
 def test_the_reference_is_the_mean_of_its_windows() -> None:
 
     places = windows.places(rough(100, 60), Coherence(sigma_um=SIGMA))
-    light = Spectrum(illuminant=LaserLine(lambda_nm=550.0))
+    light = Light(illuminant=LaserLine(lambda_nm=550.0))
     wi, wr = np.array([[0.0, 0.0, 1.0]]), np.array([[0.6, 0.0, 0.8]])
     each = [xyz_direct(place, SIGMA, light, Material(), wi, wr) for place in places]
     found = MeanReference(places, SIGMA, 550.0).xyz(light, Material(), wi, wr)

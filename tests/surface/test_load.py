@@ -10,17 +10,17 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from pipeline.config.models import Surface
 from pipeline.errors import ScanError
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.load import ScanRecord, load_scan
+from pipeline.surface.source import SurfaceSource
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 RAMP = np.arange(120.0).reshape(10, 12)
 
 
 def load(path: Path, **keys: Any) -> tuple[HeightField, ScanRecord]:
-    return load_scan(Surface(path=str(path), **keys))
+    return load_scan(SurfaceSource(path=str(path), **keys))
 
 
 def told(path: Path, **keys: Any) -> str:
@@ -199,7 +199,7 @@ def test_pitch_out_of_reach(npy: Path, pitch: tuple[float, float]) -> None:
 
 def test_a_recipe_is_no_file() -> None:
     with pytest.raises(ValueError, match="recipe"):
-        load_scan(Surface.model_validate({"recipe": {"kind": "mirror"}}))
+        load_scan(SurfaceSource.model_validate({"recipe": {"kind": "mirror"}}))
 
 
 # --- real scans --------------------------------------------------------------------------------------

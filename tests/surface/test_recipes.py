@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from pipeline.config.models import Recipe
 from pipeline.errors import ConfigError
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
 from pipeline.surface.recipes.disc import LONGEST_RUN, SHORTEST_RUN, draw_runs
+from pipeline.surface.recipes.parameters import Recipe
 
 ADAPTER: TypeAdapter[Any] = TypeAdapter(Recipe)
 GRATINGS = ("sinusoid", "rectangular", "blazed")

@@ -10,10 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from pipeline.config.models import Blazed, CompactDisc, Elaphe, GaussianRandom, Sinusoid, TiltedMirror, Xenopeltis
 from pipeline.surface.conditioning import condition
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
+from pipeline.surface.recipes.parameters import (
+    Blazed,
+    CompactDisc,
+    Elaphe,
+    GaussianRandom,
+    Sinusoid,
+    TiltedMirror,
+    Xenopeltis,
+)
 from pipeline.surface.statistics import SurfaceStatistics, covered_share, measure
 
 SCANS = Path(__file__).parents[2].parent / "shared" / "data" / "snakes"

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.config.models import Blazed, CompactDisc
-from pipeline.config.models import Surface as SurfaceSection
 from pipeline.evaluation.figures import map_physics
 from pipeline.evaluation.figures.exact_maps import (
     NORMAL,
@@ -28,7 +26,9 @@ from pipeline.optics.colour_error import pixels
 from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.surface import recipes
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.surface.recipes.parameters import Blazed, CompactDisc
+from pipeline.surface.source import SurfaceSource
+from pipeline.tables.evaluate import Map
 
 # [S14] fig. 2.13's series; light from the right, so that what the tilt brings into view appears there
 _INCIDENCES: Sequence[Light] = (NORMAL, (10.0, 0.0), (20.0, 0.0), (30.0, 0.0))
@@ -95,7 +95,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
 
 def _disc(bench: Bench) -> Surface:
     """The synthetic compact disc under the window and light of the bench's grating."""
-    section = SurfaceSection(recipe=_DISC)
+    section = SurfaceSource(recipe=_DISC)
     config = bench.blazed.config.model_copy(update={"name": "cd", "surface": section})
     return Surface(config, recipes.make(_DISC), scan=False)
 
@@ -111,7 +111,7 @@ def _show(surface: Surface, views: Map, lights: Sequence[Light], progress: Progr
 
 def _one_sided(blazed: _Shown, recipe: Blazed, views: Map) -> Check:
     config, wr = blazed.surface.config, views.views()
-    left, right = map_physics.first_orders(wr, recipe, config.spectrum.range_nm)
+    left, right = map_physics.first_orders(wr, recipe, config.light.range_nm)
     measured = float(blazed.exact[left, 1].sum() / blazed.exact[right, 1].sum())
     sides = (map_physics.blazed_luminance(config, recipe, wr[side]).sum() for side in (left, right))
     closed = float(next(sides) / next(sides))
@@ -217,7 +217,7 @@ def _pictures(views: Map, shown: Sequence[_Shown], look_up: Array) -> list[Pictu
     from pipeline.evaluation.plots import map_plots
 
     def panel(each: _Shown, xyz: Array, title: str, note: str = "") -> map_plots.Panel:
-        image = views.image(xyz / relative_unit(each.surface.config))
+        image = views.image(xyz / each.surface.config.radiometry.unit)
         return map_plots.Panel(pixels(image, SHOWN_RU), title, note)
 
     def rows(chosen: Sequence[_Shown]) -> list[list[map_plots.Panel]]:

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from pipeline.config.models import Blazed, Config
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
 from pipeline.evaluation.figures.exact_maps import NORMAL, SHOWN_RU, blazed_recipe, directions, views_of
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
@@ -15,10 +15,11 @@ from pipeline.optics import geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import pixels
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.surface.recipes.parameters import Blazed
+from pipeline.tables.evaluate import Map
 
 # 16.25 um is [D14]'s; the others hold from four periods of 2.5 um in their 4 sigma to fifty-two
 _SIGMAS_UM = (2.5, 5.0, 10.0, 16.25, 32.5)
@@ -77,12 +78,12 @@ def make(bench: Bench, progress: Progress) -> Figure:
 def _look(surface: Surface, recipe: Blazed, sigma_um: float, views: Map, progress: Progress) -> _Seen:
     config = surface.config
     rows = HeightField(surface.field.heights_um[:_ROWS], surface.field.pitch_um)
-    exact = Reference(rows, sigma_um, shortest_wavelength_nm(config.spectrum), progress)
+    exact = Reference(rows, sigma_um, config.light.lambda_min_nm, progress)
     expected = sigma_f(sigma_um) / sqrt(2.0)
     wi, wr = directions(views, NORMAL)
-    xyz = exact.xyz(config.spectrum, config.material, wi, wr, _map_step_nm(sigma_um), progress)
+    xyz = exact.xyz(config.light, config.material, wi, wr, _map_step_nm(sigma_um), progress)
     width = _line_width(exact, recipe.period_um, expected)
-    return _Seen(sigma_um, width, expected, _purity(exact, config, recipe.period_um), xyz / relative_unit(config))
+    return _Seen(sigma_um, width, expected, _purity(exact, config, recipe.period_um), xyz / config.radiometry.unit)
 
 
 def _map_step_nm(sigma_um: float) -> float:
@@ -109,8 +110,8 @@ def _purity(exact: Reference, config: Config, period_um: float) -> float:
     import colour
 
     wi, wr = _views_along_x(1e-3 * np.linspace(*_FIRST_ORDER_NM, _AXIS_SAMPLES) / period_um)
-    xyz = exact.xyz(config.spectrum, config.material, wi, wr)
-    white = colour.XYZ_to_xy(trapezoid(config.spectrum, STEP_NM).weights.sum(axis=0))
+    xyz = exact.xyz(config.light, config.material, wi, wr)
+    white = colour.XYZ_to_xy(trapezoid(config.light, STEP_NM).weights.sum(axis=0))
     return float(np.mean(colour.excitation_purity(colour.XYZ_to_xy(xyz), white)))
 
 

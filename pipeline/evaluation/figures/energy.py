@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 
-from pipeline.config.models import Config, LaserLine, Material, Spectrum
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
 from pipeline.evaluation.figures.order_efficiencies import LAMBDA_MIN_NM, PERIOD_UM, Grating, known_gratings
@@ -15,13 +15,15 @@ from pipeline.evaluation.methods.polar_table import PolarTableMethod
 from pipeline.optics import geometry, gratings
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.material import Material
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField
 
 LAMBDA_NM = 550.0
 # R = 1 and no shadowing: all light that falls on the surface should leave it
 LOSSLESS = Material(fresnel="none", shadowing=False, normalisation="absolute")
-_LINE = Spectrum(illuminant=LaserLine(lambda_nm=LAMBDA_NM))
+_LINE = Light(illuminant=LaserLine(lambda_nm=LAMBDA_NM))
 # of views, in widths of an order's lobe on the unit disc: sums of Gaussians so far apart err by 2 exp(-pi^2 / 0.9^2)
 _VIEW_SPACING = 0.9
 # what G / w^2 changes by across a lobe of the window's width, towards grazing angles

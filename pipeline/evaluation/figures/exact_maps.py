@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.accuracy.checks import MAP_RADIUS
-from pipeline.config.models import Blazed, Config
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures.figure import Bench, Surface
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import DISPLAY_GAMMA, delta_e, displayed_srgb
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.surface.recipes.parameters import Blazed
+from pipeline.tables.evaluate import Map
 
 # [D14] sec. 7 shows its maps at 1500 RU; table 2 ends at 7500
 SHOWN_RU, STRICT_RU = 1500.0, 7500.0
@@ -41,7 +41,7 @@ def directions(views: Map, light: Light) -> tuple[Array, Array]:
 def reference(surface: Surface, progress: Progress) -> Reference:
     """The exact reference of a surface under its config's window."""
     config = surface.config
-    return Reference(surface.field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
+    return Reference(surface.field, config.coherence.sigma_um, config.light.lambda_min_nm, progress)
 
 
 def blazed_recipe(bench: Bench) -> Blazed:
@@ -54,7 +54,7 @@ def blazed_recipe(bench: Bench) -> Blazed:
 
 def mean_delta_e(config: Config, found: Array, exact: Array, exposure_ru: float) -> float:
     """Mean CIELAB error over the views of XYZ (views, 3)."""
-    unit = relative_unit(config)
+    unit = config.radiometry.unit
     return float(np.mean(delta_e(found / unit, exact / unit, exposure_ru)))
 
 
@@ -67,5 +67,5 @@ def exact_maps(surface: Surface, views: Map, lights: Sequence[Light], progress: 
     """XYZ (views, 3) by the exact reference, one map a light."""
     exact, config = reference(surface, progress), surface.config
     return [
-        exact.xyz(config.spectrum, config.material, *directions(views, light), progress=progress) for light in lights
+        exact.xyz(config.light, config.material, *directions(views, light), progress=progress) for light in lights
     ]

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.config.models import Spectrum
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import peaks
 from pipeline.evaluation.figures.figure import Surface
@@ -19,6 +18,7 @@ from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.optics.geometry import Array
 from pipeline.optics.grating_equation import period_um, viewing_angle
+from pipeline.optics.light import Light
 from pipeline.surface.heightfield import HeightField
 
 THETA_I = np.radians(75.0)  # [D14] sec. 6.1
@@ -286,7 +286,7 @@ class ShaderPowers:
 
     def of(self, name: str, surface: Surface) -> Power:
         if (name, surface.name) not in self._made:
-            config = surface.config.model_copy(update={"spectrum": Spectrum(range_nm=RANGE_NM)})
+            config = surface.config.model_copy(update={"light": Light(range_nm=RANGE_NM)})
             method = METHODS[name](surface.field, config)
             assert isinstance(method, Monochromatic)
             self._made[name, surface.name] = method.power

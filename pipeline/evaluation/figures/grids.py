@@ -11,11 +11,10 @@ from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Su
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.methods.paper_look_up import PUBLISHED_POWER, PUBLISHED_RESOLUTION
 from pipeline.evaluation.methods.paper_reference import TOLERANCE, taylor_stack
-from pipeline.optics import brdf
 from pipeline.optics.colour_error import delta_e, displayed_srgb, pixels
 from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
-from pipeline.tables.evaluate import Map, relative_unit, table_evaluator
+from pipeline.tables.evaluate import Map, table_evaluator
 from pipeline.tables.taylor import table as taylor
 
 _LINEAR, _BETWEEN = 1.0, 2.0
@@ -46,7 +45,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
     """The page: errors of both grids at two resolutions, over the map and by distance from the mirror direction."""
     views, surface = views_of(bench), bench.elaphe
     sizes = (_FIGURE_NODES, _QUICK_NODES if bench.quick else PUBLISHED_RESOLUTION)
-    exact = exact_maps(surface, views, [NORMAL], progress)[0] / relative_unit(surface.config)
+    exact = exact_maps(surface, views, [NORMAL], progress)[0] / surface.config.radiometry.unit
     found = _measure(surface, views, exact, sizes, progress)
     return Figure(
         name="grids",
@@ -64,7 +63,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
 
 def _measure(surface: Surface, views: Map, exact: Array, sizes: Sequence[int], progress: Progress) -> _Grids:
     config = surface.config
-    rule = brdf.integrand_of(config)(PUBLISHED_STEP_NM)
+    rule = config.radiometry.integrand(PUBLISHED_STEP_NM)
     built = taylor_stack(surface.field, config, TOLERANCE)
     wi, wr = directions(views, NORMAL)
     fine = _steps(views, exact)
@@ -72,7 +71,7 @@ def _measure(surface: Surface, views: Map, exact: Array, sizes: Sequence[int], p
     for nodes in sizes:
         for power in _POWERS:
             table = taylor.build(built, rule, nodes, power, progress=progress)
-            xyz = table_evaluator(table, config)(wi, wr) / relative_unit(config)
+            xyz = table_evaluator(table, config.radiometry)(wi, wr) / config.radiometry.unit
             shown = float(np.mean(delta_e(xyz, exact, SHOWN_RU)))
             detail = float(np.corrcoef(_steps(views, xyz), fine)[0, 1])
             found[nodes, power] = _Grid(xyz, delta_e(xyz, exact, STRICT_RU), shown, detail)

@@ -11,9 +11,14 @@ from importlib.resources import files
 
 import numpy as np
 
-from pipeline.config.models import Accuracy, Coherence, Config, Direction, Material, PolarLayout, Scene, Spectrum
+from pipeline.config.models import Accuracy, Config
 from pipeline.optics import geometry
+from pipeline.optics.coherence import Coherence
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import Light
+from pipeline.optics.material import Material
+from pipeline.optics.scene import Direction, Scene
+from pipeline.tables.polar.layout import PolarLayout
 
 LIGHT = Direction(theta_deg=45.0, phi_deg=180.0)
 APERTURE_UM = 65.0
@@ -85,7 +90,7 @@ def experiment(config: Config) -> Config:
     return config.model_copy(
         update={
             "coherence": Coherence(sigma_um=APERTURE_UM / 4.0),
-            "spectrum": Spectrum(illuminant=laser),
+            "light": Light(illuminant=laser),
             "material": Material(fresnel="conductor", metal="Au"),
             "table": PolarLayout(),
             "accuracy": Accuracy(delta_e=DELTA_E),

@@ -5,13 +5,14 @@ from math import radians
 
 import numpy as np
 
-from pipeline.config.models import Blazed, Config
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
 from pipeline.evaluation.figures.exact_maps import Light, directions
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import trapezoid
+from pipeline.surface.recipes.parameters import Blazed
 from pipeline.tables.evaluate import Map
 
 _SECTOR_RAD = radians(22.5)
@@ -61,7 +62,7 @@ def blazed_luminance(config: Config, recipe: Blazed, wr: Array) -> Array:
     through the window's transform.
     """
     wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape)
-    rule, uvw = trapezoid(config.spectrum, STEP_NM), geometry.uvw(wi, wr)
+    rule, uvw = trapezoid(config.light, STEP_NM), geometry.uvw(wi, wr)
     lambda_um, width = 1e-3 * rule.lambda_nm, sigma_f(config.coherence.sigma_um)
     power = np.zeros((len(wr), len(lambda_um)))
     for m in _BLAZE_ORDERS:

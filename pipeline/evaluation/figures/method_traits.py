@@ -17,9 +17,9 @@ from pipeline.evaluation.methods.flss import Flss
 from pipeline.evaluation.methods.method import Method
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import trapezoid
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 _DIRECTIONS, _SEED = 1000, 20140701
 # of the mirror: a decade below black at 7500 RU
@@ -65,7 +65,7 @@ def _luminance(surface: Surface, methods: Mapping[str, Method], sin_theta: Array
     wr = np.stack([sin_theta, np.zeros_like(sin_theta), np.sqrt(1.0 - sin_theta**2)], axis=-1)
     wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape).copy()
     # Y that |P|^2 = 1 would give
-    mirror = brdf.direction_factor(surface.config.material, trapezoid(surface.config.spectrum, STEP_NM), wi, wr)
+    mirror = brdf.direction_factor(surface.config.material, trapezoid(surface.config.light, STEP_NM), wi, wr)
     return Line(sin_theta, {name: method.xyz(wi, wr)[:, 1] / mirror for name, method in methods.items()})
 
 
@@ -84,7 +84,7 @@ def lit_share(surface: Surface, method: Method) -> float:
     x, y = np.meshgrid(np.linspace(*_PRIMARY_X, along), np.linspace(-_PRIMARY_Y, _PRIMARY_Y, across))
     wr = np.stack([x.ravel(), y.ravel(), np.sqrt(1.0 - x.ravel() ** 2 - y.ravel() ** 2)], axis=-1)
     wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape).copy()
-    return float(np.mean(lit_views(method.xyz(wi, wr) / relative_unit(surface.config))))
+    return float(np.mean(lit_views(method.xyz(wi, wr) / surface.config.radiometry.unit)))
 
 
 def band_contrast(luminance: Array, views: Map) -> float:

@@ -16,7 +16,7 @@ from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import delta_e, pixels
 from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 _GEMS, _BUMPS, _GAUSSIAN = "GPU Gems", "Stam bumps", "Stam Gaussian"
 # ours first, then from the nearest relative to the farthest
@@ -101,12 +101,12 @@ def make(bench: Bench, progress: Progress) -> Figure:
 
 
 def _sheet(bench: Bench, surface: Surface, views: Map, progress: Progress) -> _Sheet:
-    unit, methods, maps = relative_unit(surface.config), {}, {}
+    unit, methods, maps = surface.config.radiometry.unit, {}, {}
     for done, name in enumerate(_ORDER, start=1):
         made = on_elaphe(bench, name) if surface is bench.elaphe else run(name, surface, views)
         methods[name], maps[name] = made.method, made.xyz / unit
         progress(f"methods on {surface.name}", done / len(_ORDER))
-    width = sigma_f(surface.config.coherence.sigma_um) * 1e-3 * surface.config.spectrum.range_nm[1]
+    width = sigma_f(surface.config.coherence.sigma_um) * 1e-3 * surface.config.light.range_nm[1]
     # at least the middle row of pixels
     strip = np.abs(views.views()[:, 1]) < max(_STRIP_WIDTHS * width, 1.0 / views.size)
     maps[_GEMS] = np.where(strip[:, None], maps[_GEMS], 0.0)

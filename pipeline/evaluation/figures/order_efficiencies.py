@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import Blazed, Recipe, Rectangular, Sinusoid
-from pipeline.diffraction import expansion as series
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
@@ -20,6 +18,7 @@ from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Blazed, Recipe, Rectangular, Sinusoid
 from pipeline.tables.polar import spectral
 
 if TYPE_CHECKING:
@@ -45,6 +44,7 @@ _SHOWN, _SHOWN_ORDERS = (0, 2), (-2, -1, 0, 1, 2)
 
 # |c_m|^2 of orders at s, 1/um
 Power = Callable[[Array, Array], Array]
+_LINE_SPACING = power_spectrum.SPACING_OF_A_LINE
 
 
 @dataclass(frozen=True)
@@ -127,13 +127,13 @@ def places(lambda_nm: Array) -> Places:
 
 
 def polar_power(field: HeightField, sigma_um: float, spacing: float) -> Callable[[Array, float], Array]:
-    """|P|^2 of a grating along x from the polar spectrum E, its radii `spacing` widths of the window apart."""
-    z = series.largest_phase(field.half_range_um, LAMBDA_MIN_NM)
-    terms, nodes = (series.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-7, 1e-6))
-    radius = spectrum.radii(sigma_um, 2e3 / LAMBDA_MIN_NM, spacing)
-    built = spectrum.chebyshev_stack(field, sigma_um, float(radius[-1]), terms, 1e-7)
+    """|P|^2 of a grating along x from the polar power spectrum E, its radii `spacing` widths of the window apart."""
+    z = expansion.largest_phase(field.half_range_um, LAMBDA_MIN_NM)
+    terms, nodes = (expansion.chebyshev_order(z, tolerance) + 1 for tolerance in (1e-7, 1e-6))
+    radius = power_spectrum.radii(sigma_um, 2e3 / LAMBDA_MIN_NM, spacing)
+    built = power_spectrum.chebyshev_stack(field, sigma_um, float(radius[-1]), terms, 1e-7)
     # orders lie at azimuths 0 and pi, which are nodes of every grid
-    table = spectral.build(spectrum.build(built, Azimuths(32), radius, LAMBDA_MIN_NM, nodes))
+    table = spectral.build(power_spectrum.build(built, Azimuths(32), radius, LAMBDA_MIN_NM, nodes))
     return lambda uvw, nm: spectral.look_up(table, uvw, np.array([nm]))[:, 0]
 
 
@@ -167,7 +167,7 @@ def answers(grating: Grating, sigma_um: float, at: Places) -> Answers:
         direct=at.by_wavelength(partial(power_direct, field, sigma_um)),
         reference=at.by_wavelength(lambda uvw, nm: reference.power(uvw, np.array([nm]))[:, 0]),
         polar=at.by_wavelength(polar_power(field, sigma_um, FINE_SPACING)),
-        polar_of_a_line=at.by_wavelength(polar_power(field, sigma_um, spectrum.SPACING_OF_A_LINE)),
+        polar_of_a_line=at.by_wavelength(polar_power(field, sigma_um, _LINE_SPACING)),
     )
 
 
@@ -211,7 +211,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
         title="Order efficiencies against closed forms",
         source="not in [D14] or [S14]",
         expected="|P|² at f = m / period is |c_m|², the Fourier coefficient of exp(i k w h): a Bessel function of a "
-        "sinusoid, the sinc of a step and of a sawtooth. Wanted of the exact reference and of the polar spectrum E: "
+        "sinusoid, the sinc of a step and of a sawtooth. Wanted of the reference and of the polar power spectrum: "
         f"{TOLERANCE:g} of the mirror's peak, in normal and oblique light, in the plane of the orders and across it.",
         checks=[check for grating in known for check in _checks(grating.name, found[grating.name])],
         tables=[_table(found, at)],
@@ -221,7 +221,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
                     [[_panel(g, found[g.name], at, light) for g in known] for light in _SHOWN]
                 ),
                 f"|c_m|² against wavelength, period {PERIOD_UM:g} µm. Lines: closed forms. Dots: exact reference. "
-                "Crosses: polar spectrum E. Above in normal light, below at 60°.",
+                "Crosses: polar power spectrum E. Above in normal light, below at 60°.",
             ),
             Picture(
                 validity_plots.sampling_curves(
@@ -271,8 +271,8 @@ def _differences(found: Answers) -> dict[str, float]:
         "sum over samples, from the samples' closed form": found.direct - found.samples,
         "exact reference, from the samples' closed form": found.reference - found.samples,
         "exact reference, from the profile's": found.reference - found.profile,
-        f"polar spectrum E, radii {FINE_SPACING:g} σ_f apart, from the profile's": found.polar - found.profile,
-        f"polar spectrum E, radii {spectrum.SPACING_OF_A_LINE:g} σ_f apart (a laser line's), from the samples'": (
+        f"polar power spectrum E, radii {FINE_SPACING:g} σ_f apart, from the profile's": found.polar - found.profile,
+        f"polar power spectrum E, radii {_LINE_SPACING:g} σ_f apart (a laser line's), from the samples'": (
             found.polar_of_a_line - found.samples
         ),
     }
@@ -280,7 +280,7 @@ def _differences(found: Answers) -> dict[str, float]:
 
 
 def _checks(name: str, found: Answers) -> list[Check]:
-    bounds = (ROUNDING, ROUNDING, TOLERANCE, TOLERANCE, between_radii(spectrum.SPACING_OF_A_LINE))
+    bounds = (ROUNDING, ROUNDING, TOLERANCE, TOLERANCE, between_radii(_LINE_SPACING))
     return [
         Check(f"{name}: {what}", f"≤ {bound:.2g}", f"{worst:.1e}", worst <= bound)
         for (what, worst), bound in zip(_differences(found).items(), bounds, strict=True)
@@ -299,7 +299,14 @@ def _table(found: dict[str, Answers], at: Places) -> Table:
         for name, each in found.items()
         for i in np.flatnonzero((at.lambda_nm == middle) & np.isin(at.order, (0, 1)))
     ]
-    columns = ("grating and order", "light", "closed form", "exact reference", "sum over samples", "polar spectrum E")
+    columns = (
+        "grating and order",
+        "light",
+        "closed form",
+        "exact reference",
+        "sum over samples",
+        "polar power spectrum E",
+    )
     return Table(f"|c_m|² at {middle:g} nm", columns, rows)
 
 
@@ -317,7 +324,7 @@ def _remarks(needed: dict[str, int]) -> list[str]:
         ),
         (
             "E between its radii is interpolated on 8 of them. At a laser line's distance that leaves "
-            f"{between_radii(spectrum.SPACING_OF_A_LINE):.1e} of an order's peak at most, at {FINE_SPACING:g} σ_f "
+            f"{between_radii(_LINE_SPACING):.1e} of an order's peak at most, at {FINE_SPACING:g} σ_f "
             f"{between_radii(FINE_SPACING):.1e}. Integrals over wavelengths average it out."
         ),
     ]

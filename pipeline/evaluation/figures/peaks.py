@@ -16,13 +16,13 @@ from math import cos, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import Material
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window, sigma_f
 from pipeline.optics.geometry import Array
 from pipeline.optics.grating_equation import in_plane
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 
 # |P|^2 (directions, L) for uvw (directions, 3) and wavelengths in nm (L,)

@@ -108,12 +108,12 @@ def make(bench: Bench, progress: Progress) -> Figure:
 
 def _reference(surface: Surface) -> Reference:
     config = surface.config
-    return Reference(surface.field, config.coherence.sigma_um, config.spectrum.range_nm[0])
+    return Reference(surface.field, config.coherence.sigma_um, config.light.range_nm[0])
 
 
 def _exact(reference: Reference, config: Config) -> Colour:
     """At every nanometre."""
-    return lambda wi, wr: reference.xyz(config.spectrum, config.material, wi, wr)
+    return lambda wi, wr: reference.xyz(config.light, config.material, wi, wr)
 
 
 def _colours(surface: Surface) -> dict[str, Colour]:

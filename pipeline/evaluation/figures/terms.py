@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf
 
 from pipeline.accuracy.checks import MAP_RADIUS
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import expansion
 from pipeline.evaluation.figures import map_physics
 from pipeline.evaluation.figures.exact_maps import (
     NORMAL,
@@ -20,9 +20,8 @@ from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Su
 from pipeline.evaluation.figures.truncated_series import STEP_NM, ChebyshevSeries, TaylorSeries
 from pipeline.optics.colour_error import delta_e, pixels
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 _CENTRED, _RAISED, _CHEBYSHEV = "Taylor, centred", "Taylor, 0 to max", "Chebyshev"
 # [S14] 2.1: N that it found enough for the blazed grating, for Elaphe, and for all its surfaces
@@ -103,17 +102,17 @@ def make(bench: Bench, progress: Progress) -> Figure:
 
 def _study(surface: Surface, views: Map, progress: Progress) -> _Study:
     config, exact = surface.config, reference(surface, progress)
-    unit = relative_unit(config)
+    unit = config.radiometry.unit
     wi, wr = directions(_CURVE_VIEWS, NORMAL)
-    truth = exact.xyz(config.spectrum, config.material, wi, wr, STEP_NM) / unit
+    truth = exact.xyz(config.light, config.material, wi, wr, STEP_NM) / unit
     lit = lit_views(truth)
 
     def errors(found: Array) -> tuple[float, float]:
         shown, strict = (delta_e(found[lit] / unit, truth[lit], ru) for ru in (SHOWN_RU, STRICT_RU))
         return float(shown.mean()), float(strict.mean())
 
-    z = series.largest_phase(surface.field.half_range_um, shortest_wavelength_nm(config.spectrum))
-    bound, bound_raised = (series.taylor_order(phase, _BOUND) for phase in (z, 2.0 * z))
+    z = expansion.largest_phase(surface.field.half_range_um, config.light.lambda_min_nm)
+    bound, bound_raised = (expansion.taylor_order(phase, _BOUND) for phase in (z, 2.0 * z))
     centred = TaylorSeries.centred(surface, max(_ORDERS[-1], bound))
     raised = TaylorSeries.centred(surface, _PUBLISHED_ALL).raised()
     chebyshev = ChebyshevSeries(surface, _ORDERS[-1])

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import comb
 
 from kernels import diffraction
-from pipeline.diffraction import dft_stack as stack
+from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Basis, Stack
 from pipeline.diffraction.reference import integrate
 from pipeline.diffraction.upload import upload
@@ -19,7 +19,7 @@ from pipeline.evaluation.figures.figure import Surface
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.tables.taylor import table as taylor
 
 STEP_NM = PUBLISHED_STEP_NM
@@ -54,9 +54,9 @@ class TaylorSeries:
         """XYZ (directions, 3) of the terms up to `order`."""
         config = self.surface.config
         summed = taylor.at_directions(
-            _cut(self.stack, order), brdf.integrand_of(config)(STEP_NM), geometry.uvw(wi, wr)
+            _cut(self.stack, order), config.radiometry.integrand(STEP_NM), geometry.uvw(wi, wr)
         )
-        factor = brdf.direction_factor(config.material, trapezoid(config.spectrum, STEP_NM), wi, wr)
+        factor = brdf.direction_factor(config.material, trapezoid(config.light, STEP_NM), wi, wr)
         return np.asarray(factor[:, None] * summed)
 
 
@@ -73,7 +73,7 @@ class ChebyshevSeries:
 
     def xyz(self, order: int, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) of the terms up to `order`."""
-        config, rule = self.surface.config, trapezoid(self.surface.config.spectrum, STEP_NM)
+        config, rule = self.surface.config, trapezoid(self.surface.config.light, STEP_NM)
         terms = upload(_cut(self._stack, order))
         power = diffraction.power_spectrum(terms, geometry.uvw(wi, wr), 1e-3 * rule.lambda_nm)
         return integrate(power, rule, config.material, config.coherence.sigma_um, wi, wr)
@@ -81,8 +81,8 @@ class ChebyshevSeries:
 
 def _stack(surface: Surface, basis: Basis, order: int) -> Stack:
     config = surface.config
-    reachable = 1e3 / shortest_wavelength_nm(config.spectrum)
-    return stack.build(surface.field, basis, order + 1, config.coherence.sigma_um, reachable, _WINDOW_CUT)
+    reachable = 1e3 / config.light.lambda_min_nm
+    return dft_stack.build(surface.field, basis, order + 1, config.coherence.sigma_um, reachable, _WINDOW_CUT)
 
 
 def _cut(whole: Stack, order: int) -> Stack:

@@ -20,9 +20,9 @@ from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e, pixels
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.tables.evaluate import Map
 
 _STEPS_NM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 _SHOWN_NM = (1.0, 5.0, 10.0, 20.0, 50.0)
@@ -88,7 +88,7 @@ def make(bench: Bench, progress: Progress) -> Figure:
 def _measure(surface: Surface, views: Map, progress: Progress) -> _Steps:
     """|P|^2 once on the finest nodes; every other step's are among them."""
     config, exact = surface.config, reference(surface, progress)
-    rules = {step: trapezoid(config.spectrum, step) for step in (_FINEST_NM, *_STEPS_NM)}
+    rules = {step: trapezoid(config.light, step) for step in (_FINEST_NM, *_STEPS_NM)}
     finest = rules[_FINEST_NM].lambda_nm
     among = {step: np.searchsorted(finest, rule.lambda_nm - 0.5 * _FINEST_NM) for step, rule in rules.items()}
     wi, wr = directions(views, NORMAL)
@@ -98,9 +98,10 @@ def _measure(surface: Surface, views: Map, progress: Progress) -> _Steps:
         power = exact.power(geometry.uvw(wi[part], wr[part]), finest)
         for step, rule in rules.items():
             seen = power[:, among[step]]
-            xyz[step][part] = integrate(
-                seen, rule, config.material, config.coherence.sigma_um, wi[part], wr[part]
-            ) / relative_unit(config)
+            xyz[step][part] = (
+                integrate(seen, rule, config.material, config.coherence.sigma_um, wi[part], wr[part])
+                / config.radiometry.unit
+            )
         progress("wavelength steps", part.stop / len(wr))
     return _Steps(surface, xyz, lit_views(xyz[_FINEST_NM]))
 

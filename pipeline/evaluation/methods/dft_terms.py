@@ -25,11 +25,10 @@ from scipy.fft import ifft2
 
 from kernels import neighbourhood
 from pipeline.config.models import Config
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import expansion
 from pipeline.diffraction.device import require_device
 from pipeline.optics.coherence import reach_sigmas, sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 
 # of exp(i k w h) at the worst sample: what is left out of the Taylor series where no number of terms is given
@@ -107,13 +106,13 @@ class Lookup:
         Raises DeviceError where no device works.
         """
         require_device()
-        lambda_min = shortest_wavelength_nm(config.spectrum)
+        lambda_min = config.light.lambda_min_nm
         if terms is None:
-            z = series.largest_phase(field.half_range_um, lambda_min)
-            terms = 1 + series.taylor_order(z, SERIES_TOLERANCE)
+            z = expansion.largest_phase(field.half_range_um, lambda_min)
+            terms = 1 + expansion.taylor_order(z, SERIES_TOLERANCE)
         self._half_range_um = field.half_range_um
         self._band = field.band_limit_per_um
-        self._highest = series.W_MAX / (1e-3 * lambda_min)
+        self._highest = expansion.W_MAX / (1e-3 * lambda_min)
         sigma_um, size_um = config.coherence.sigma_um, field.size_um
         taps_x, taps_y = (_taps(reach, size, sigma_um) for size in size_um)
         kept_x, kept_y = (

@@ -3,7 +3,6 @@
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 
 
@@ -15,7 +14,7 @@ class Exact:
     def __init__(self, field: HeightField, config: Config) -> None:
         """Raises AccuracyError where the samples do not resolve the window; DeviceError where no device works."""
         self._config = config
-        self._reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum))
+        self._reference = Reference(field, config.coherence.sigma_um, config.light.lambda_min_nm)
 
     @property
     def stored_bytes(self) -> int:
@@ -24,7 +23,7 @@ class Exact:
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        return self._reference.xyz(self._config.spectrum, self._config.material, wi, wr)
+        return self._reference.xyz(self._config.light, self._config.material, wi, wr)
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|P|^2 (directions, L); NaN beyond the scan's band."""

@@ -10,10 +10,8 @@ from pipeline.config.models import Config
 from pipeline.errors import ConfigError
 from pipeline.optics import colour_data
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import dominant_periods
-from pipeline.tables.evaluate import relative_unit
 
 # [G04]'s text has eight orders, its listing's loop n = 1 .. 7
 PUBLISHED_ORDERS = 8
@@ -48,7 +46,7 @@ class Gems:
         no period.
         """
         if spacing_um is None:
-            found = dominant_periods(field, 2e3 / shortest_wavelength_nm(config.spectrum), 1)
+            found = dominant_periods(field, 2e3 / config.light.lambda_min_nm, 1)
             if not found:
                 raise ConfigError(config.name, [("spacing_um", "the surface has no period: give one")])
             spacing_um = found[0].period_um
@@ -57,7 +55,7 @@ class Gems:
         self.spacing_um, self._orders, self._roughness = spacing_um, orders, roughness
         self._highlight = np.array(highlight)
         exposure = config.render.exposure_ru if shown_at_ru is None else shown_at_ru
-        self._unit = relative_unit(config) / exposure
+        self._unit = config.radiometry.unit / exposure
 
     @property
     def stored_bytes(self) -> int:

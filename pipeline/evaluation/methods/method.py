@@ -11,7 +11,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import integrate
 from pipeline.optics import brdf, geometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, trapezoid
+from pipeline.optics.light import Quadrature, trapezoid
 from pipeline.surface.heightfield import HeightField
 
 # the step of [D14] sec. 5 and [S14] 1.3.2
@@ -66,7 +66,7 @@ def integrated(
     power: Callable[[Array, Array], Array], config: Config, wi: Array, wr: Array, step_nm: float = PUBLISHED_STEP_NM
 ) -> Array:
     """XYZ (directions, 3) of a |P|^2 given for (uvw, lambda_nm), by the trapezoidal rule ([D14] eq. 9)."""
-    quadrature = trapezoid(config.spectrum, step_nm)
+    quadrature = trapezoid(config.light, step_nm)
     values = power(-wi - wr, quadrature.lambda_nm)
     return integrate(values, quadrature, config.material, config.coherence.sigma_um, wi, wr)
 
@@ -76,9 +76,9 @@ def monochromatic_brdf(method: Monochromatic, config: Config, wi: Array, wr: Arr
 
     In 1/sr for `absolute`. What lies beyond the scan's band is NaN.
     """
-    material, light = config.material, trapezoid(config.spectrum, PUBLISHED_STEP_NM)
+    material, light = config.material, trapezoid(config.light, PUBLISHED_STEP_NM)
     single = Quadrature(lambda_nm, np.ones((len(lambda_nm), 3)))
-    inside = brdf.spectral_reflectance(material, config.spectrum, lambda_nm, geometry.cos_half(wi, wr))
+    inside = config.radiometry.reflectance(lambda_nm, geometry.cos_half(wi, wr))
     inside = inside * brdf.window_area(material, single, config.coherence.sigma_um)
     if material.fresnel == "conductor":
         outside = brdf.geometry_factor(material, wi, wr)

@@ -21,12 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import FINE_STEP_NM, Config, LaserLine
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import integrate
 from pipeline.errors import ConfigError
 from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach, tiles
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import FINE_STEP_NM, trapezoid
 from pipeline.surface.heightfield import HeightField
 
 
@@ -91,12 +91,12 @@ class Nmm:
         `terms`: T + 1 of alg. 1; None takes enough for 1e-6 of exp(i k w h).
         Raises ConfigError for a laser line, which leaves nothing to select, and DeviceError where no device works.
         """
-        if isinstance(config.spectrum.illuminant, LaserLine):
+        if config.light.is_line:
             fault = "expected a spectrum: NMM selects wavelengths from a range, and a laser line has one"
             raise ConfigError(config.name, [("spectrum.illuminant", fault)])
         self._config, self._size_um = config, field.size_um
-        self._quadrature = trapezoid(config.spectrum, FINE_STEP_NM)
-        first_order = 1e-3 * config.spectrum.range_nm[1] / min(field.size_um)
+        self._quadrature = trapezoid(config.light, FINE_STEP_NM)
+        first_order = 1e-3 * config.light.range_nm[1] / min(field.size_um)
         self.white_radius = first_order if white_radius is None else white_radius
         self._lookup = Lookup(field, config, terms, reach)
 
@@ -121,7 +121,7 @@ class Nmm:
         [S14] interpolates colour weights linearly between whole nanometres; spreading a value over both with the same
         shares gives the same sum.
         """
-        chosen = landing(uvw[:, :2], self._size_um, self._config.spectrum.range_nm)
+        chosen = landing(uvw[:, :2], self._size_um, self._config.light.range_nm)
         # what lies beyond the scan's band adds nothing
         power = np.nan_to_num(self._lookup.at_pairs("gaussian", uvw[chosen.direction], chosen.lambda_nm))
         nodes = self._quadrature.lambda_nm

@@ -3,7 +3,6 @@
 from pipeline.config.models import Config
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.methods.paper_reference import TOLERANCE, taylor_stack
-from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
@@ -27,9 +26,9 @@ class PaperLookUp:
         tolerance: float = TOLERANCE,
     ) -> None:
         """Raises AccuracyError where float32 tables would lose their digits, or not fit."""
-        rule = brdf.integrand_of(config)(PUBLISHED_STEP_NM)
+        rule = config.radiometry.integrand(PUBLISHED_STEP_NM)
         self._table = taylor.build(taylor_stack(field, config, tolerance), rule, resolution, power)
-        self._look_up = table_evaluator(self._table, config)
+        self._look_up = table_evaluator(self._table, config.radiometry)
 
     @property
     def stored_bytes(self) -> int:

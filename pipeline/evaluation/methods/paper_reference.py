@@ -5,13 +5,12 @@ from math import exp
 import numpy as np
 
 from pipeline.config.models import Config
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.reference import in_band
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, integrated
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import Quadrature, trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import table as taylor
 
@@ -65,7 +64,7 @@ def taylor_stack(field: HeightField, config: Config, tolerance: float) -> Stack:
 
     Raises AccuracyError where no number of terms reaches the tolerance in single precision.
     """
-    rule = trapezoid(config.spectrum, PUBLISHED_STEP_NM)
-    order = series.plan_taylor(field, rule, tolerance).order
-    reachable = series.W_MAX / (1e-3 * shortest_wavelength_nm(config.spectrum))
-    return stack.build(field, "taylor", order + 1, config.coherence.sigma_um, reachable, PUBLISHED_CUT)
+    rule = trapezoid(config.light, PUBLISHED_STEP_NM)
+    order = expansion.plan_taylor(field, rule, tolerance).order
+    reachable = expansion.W_MAX / (1e-3 * config.light.lambda_min_nm)
+    return dft_stack.build(field, "taylor", order + 1, config.coherence.sigma_um, reachable, PUBLISHED_CUT)

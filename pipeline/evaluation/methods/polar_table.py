@@ -1,14 +1,13 @@
 """This project's table as a method: polar, planned for the config's error budget."""
 
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
-from pipeline.config.models import Config, PolarLayout
+from pipeline.config.models import Config
 from pipeline.diffraction.dft_stack import crop_to_window
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import in_band
-from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
@@ -16,6 +15,7 @@ from pipeline.tables.planning import plan
 from pipeline.tables.planning.plan import Budget, Plan
 from pipeline.tables.polar import quadrature, spectral
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.spectral import SpectralTable
 from pipeline.tables.polar.table import PolarTable
 
@@ -34,7 +34,7 @@ class PolarTableMethod:
         self._field, self._config = crop_to_window(field, config.coherence.sigma_um).centred(), config
         self._layout = config.table if isinstance(config.table, PolarLayout) else PolarLayout()
         self._table = self._integrated(*self._planned(self._layout))
-        self._look_up = table_evaluator(self._table, config)
+        self._look_up = table_evaluator(self._table, config.radiometry)
 
     @property
     def stored_bytes(self) -> int:
@@ -65,15 +65,13 @@ class PolarTableMethod:
     def _budget(self) -> Budget:
         return Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru)
 
-    def _planned(self, layout: PolarLayout) -> tuple[PolarSpectrum, Plan]:
+    def _planned(self, layout: PolarLayout) -> tuple[PolarPowerSpectrum, Plan]:
         config = self._config
-        return plan.make(
-            [self._field], config.coherence.sigma_um, config.spectrum, config.scene, self._budget, layout
-        )
+        return plan.make([self._field], config.coherence.sigma_um, config.light, config.scene, self._budget, layout)
 
-    def _integrated(self, made: PolarSpectrum, chosen: Plan) -> PolarTable:
+    def _integrated(self, made: PolarPowerSpectrum, chosen: Plan) -> PolarTable:
         config, rho = self._config, chosen.rings.rho()
-        light, sigma_um = brdf.illumination_of(config), config.coherence.sigma_um
+        light, sigma_um = config.radiometry.illumination, config.coherence.sigma_um
         rules = quadrature.choose(light, rho, sigma_um, self._budget.quadrature)
-        reflectance = partial(brdf.spectral_reflectance, config.material, config.spectrum)
+        reflectance = config.radiometry.reflectance
         return polar.build(made, chosen.rings, rules, chosen.w_terms, reflectance)

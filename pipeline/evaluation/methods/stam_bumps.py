@@ -28,7 +28,7 @@ from pipeline.diffraction.reference import STEP_NM, integrate
 from pipeline.errors import ConfigError
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm, trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import dominant_periods
 
@@ -128,7 +128,7 @@ class StamBumps:
         """
         if not 0.0 < epsilon <= 0.5:
             raise ConfigError(config.name, [("epsilon", f"expected 0 < epsilon <= 0.5, got {epsilon:g}")])
-        self._config, self._lambda_min_nm = config, shortest_wavelength_nm(config.spectrum)
+        self._config, self._lambda_min_nm = config, config.light.lambda_min_nm
         if periods_um is None:
             if field.half_range_um == 0.0:
                 raise ConfigError(config.name, [("periods_um", "a flat surface has no period: give them")])
@@ -144,7 +144,7 @@ class StamBumps:
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        config, quadrature = self._config, trapezoid(self._config.spectrum, STEP_NM)
+        config, quadrature = self._config, trapezoid(self._config.light, STEP_NM)
         # of a laser there are no wavelengths to pick from
         power = self.power if len(quadrature.lambda_nm) == 1 else self._picked
         out = np.empty((len(wr), 3))

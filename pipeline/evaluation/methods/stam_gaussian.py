@@ -26,11 +26,10 @@ from scipy.sparse import csr_array
 from scipy.special import ive, j1
 
 from pipeline.config.models import Config
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import expansion
 from pipeline.evaluation.methods.method import integrated
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.surface.heightfield import HeightField
 
 # [D14] sec. 6.3: the circular aperture of 100 um before the laser
@@ -137,7 +136,7 @@ def _grid(shape: tuple[int, int], pitch_um: tuple[float, float], reach_per_um: f
     spacing = (1.0 / (shape[1] * pitch_um[0]), 1.0 / (shape[0] * pitch_um[1]))
     band = (0.5 / pitch_um[0], 0.5 / pitch_um[1])
     reach_x, reach_y = (floor(reach_per_um / d + 0.5) for d in spacing)
-    highest = series.W_MAX / (1e-3 * lambda_min_nm)
+    highest = expansion.W_MAX / (1e-3 * lambda_min_nm)
     x, y = (floor(min(highest, b) / d + 0.5) for b, d in zip(band, spacing, strict=True))
     rows, columns = np.arange(-y - reach_y, y + reach_y + 1), np.arange(-reach_x, x + reach_x + 1)
     return _Grid(spacing, band, (reach_x, reach_y), rows, columns)
@@ -153,7 +152,7 @@ class GaussianSurface:
         top, bottom = float(covariance_um2[0, 0]), float(covariance_um2.min())
         self._window, self._half_range_um2 = window, 0.5 * (top - bottom)
         self._grid = _grid(np.shape(covariance_um2), pitch_um, window.reach_per_um, lambda_min_nm)
-        s_max = series.largest_phase(1.0, lambda_min_nm)
+        s_max = expansion.largest_phase(1.0, lambda_min_nm)
         terms = _terms_for(s_max**2 * self._half_range_um2)
         t = (covariance_um2 - 0.5 * (top + bottom)) / (self._half_range_um2 or 1.0)
         self._diffuse, self._specular = self._transformed(t, terms)
@@ -213,7 +212,7 @@ class StamGaussian:
     def __init__(self, field: HeightField, config: Config, window: Window | None = None) -> None:
         """The coherence window of the config unless another is given, such as the text's `DiscWindow()`."""
         self._window = GaussianWindow(config.coherence.sigma_um) if window is None else window
-        lambda_min = shortest_wavelength_nm(config.spectrum)
+        lambda_min = config.light.lambda_min_nm
         self._surface = GaussianSurface(autocovariance(field), field.pitch_um, self._window, lambda_min)
         # `absolute` multiplies by the window's area
         coherence = config.coherence.model_copy(update={"sigma_um": self._window.sigma_um})

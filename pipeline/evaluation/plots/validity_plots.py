@@ -64,7 +64,7 @@ def order_curves(rows: Sequence[Sequence[OrderPanel]]) -> bytes:
     marks += [
         Line2D([], [], color=_GREY, label="closed form", linewidth=1.4),
         Line2D([], [], color=_GREY, marker="o", markerfacecolor="white", linestyle="none", label="exact reference"),
-        Line2D([], [], color=_GREY, marker="x", linestyle="none", label="polar spectrum E"),
+        Line2D([], [], color=_GREY, marker="x", linestyle="none", label="polar power spectrum E"),
     ]
     figure.legend(handles=marks, loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
     return png(figure)

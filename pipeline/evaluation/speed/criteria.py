@@ -126,7 +126,7 @@ def _times(bench: SurfaceBench) -> Iterable[Criterion]:
 def _shares(bench: SurfaceBench, machine: Machine) -> Iterable[Criterion]:
     """What the two kernels reach of whichever limit of the device binds them."""
     for reached in (share(timed, machine) for timed in bench.timed):
-        if reached.stage in ("spectrum", "apply_operator"):
+        if reached.stage in ("power spectrum", "apply_operator"):
             remark = f"of {reached.bound}, {1e3 * reached.seconds:.3g} ms"
             what = f"{reached.stage}'s share of its bound"
             yield Criterion(bench.name, "2", what, reached.bound_share, ">=", 0.4, "", remark)

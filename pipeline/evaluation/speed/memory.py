@@ -11,9 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.config.models import Config, Mirror, PolarLayout, Surface
+from pipeline.config.models import Config
 from pipeline.evaluation.speed import setting
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Mirror
+from pipeline.surface.source import SurfaceSource
+from pipeline.tables.polar.layout import PolarLayout
 
 # a large scan: as fine as a snake's, and so tall that it needs 64 terms
 LARGE_SIDE = 4096
@@ -36,7 +39,7 @@ def large_scan() -> tuple[HeightField, Config]:
     """A rough surface of 4096 x 4096 samples."""
     half = _LARGE_HALF_RANGE_UM
     heights = np.random.default_rng(_SEED).uniform(-half, half, (LARGE_SIDE, LARGE_SIDE))
-    config = Config(name="large", surface=Surface(recipe=Mirror(kind="mirror")))
+    config = Config(name="large", surface=SurfaceSource(recipe=Mirror(kind="mirror")))
     return HeightField(heights, (_LARGE_PITCH_UM, _LARGE_PITCH_UM)), config
 
 

@@ -6,14 +6,12 @@ import numpy as np
 
 from kernels import device
 from pipeline.config.models import Config
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.evaluation.speed import plain, work
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.timing import best_of, timed
-from pipeline.optics import brdf
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm
+from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import grid
 from pipeline.tables.taylor import table as taylor
@@ -44,12 +42,12 @@ class Paper:
 
     def __init__(self, field: HeightField, config: Config, repeats: int) -> None:
         self._config = config
-        plan = series.plan_taylor(field, self._quadrature(STEP_NM), _TOLERANCE)
-        reachable = series.W_MAX / (1e-3 * shortest_wavelength_nm(config.spectrum))
+        plan = expansion.plan_taylor(field, self._quadrature(STEP_NM), _TOLERANCE)
+        reachable = expansion.W_MAX / (1e-3 * config.light.lambda_min_nm)
 
-        def build() -> stack.Stack:
-            cut = stack.window_tolerance(_TOLERANCE)
-            return stack.build(field, "taylor", plan.order + 1, config.coherence.sigma_um, reachable, cut)
+        def build() -> dft_stack.Stack:
+            cut = dft_stack.window_tolerance(_TOLERANCE)
+            return dft_stack.build(field, "taylor", plan.order + 1, config.coherence.sigma_um, reachable, cut)
 
         self._stack, self._stack_s = best_of(repeats, build)
         # compiles the kernel
@@ -82,7 +80,7 @@ class Paper:
 
     def _quadrature(self, step_nm: float) -> Quadrature:
         config = self._config
-        return brdf.integrand_of(config)(step_nm)
+        return config.radiometry.integrand(step_nm)
 
 
 def _some_nodes(count: int) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
 
 
 def paper_nodes(built: Stack, quadrature: Quadrature, uv: Array) -> Array:

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 from kernels import device
 from kernels.device import Launch
-from pipeline.config.models import LaserLine
 from pipeline.diffraction.dft_stack import Stack
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.evaluation.speed import work
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.setting import Setting
@@ -23,12 +22,12 @@ class Stages:
     """Seconds of one bake's stages."""
 
     stack: float
-    spectrum: float
+    power_spectrum: float
     table: float
 
     @property
     def total(self) -> float:
-        return self.stack + self.spectrum + self.table
+        return self.stack + self.power_spectrum + self.table
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class PolarBake:
     """
 
     built: Stack
-    made: PolarSpectrum
+    made: PolarPowerSpectrum
     table: PolarTable
     stages: Stages
     second_light_s: float | None
@@ -49,7 +48,7 @@ class PolarBake:
 
 def bake(setting: Setting, repeats: int) -> PolarBake:
     """Bakes a table several times over; the kernels must have been compiled."""
-    setting.table(setting.spectrum(setting.stack()), setting.light)
+    setting.table(setting.power_spectrum(setting.stack()), setting.light)
     with device.timing() as launches:
         runs = [_once(setting) for _ in range(repeats)]
     built, made, table, _ = runs[-1]
@@ -68,15 +67,15 @@ def best(first: PolarBake, again: PolarBake) -> PolarBake:
     )
 
 
-def _once(setting: Setting) -> tuple[Stack, PolarSpectrum, PolarTable, Stages]:
+def _once(setting: Setting) -> tuple[Stack, PolarPowerSpectrum, PolarTable, Stages]:
     built, stack_s = timed(setting.stack)
-    made, spectrum_s = timed(lambda: setting.spectrum(built))
+    made, power_spectrum_s = timed(lambda: setting.power_spectrum(built))
     table, table_s = timed(lambda: setting.table(made, setting.light))
-    return built, made, table, Stages(stack_s, spectrum_s, table_s)
+    return built, made, table, Stages(stack_s, power_spectrum_s, table_s)
 
 
-def _second_light(setting: Setting, made: PolarSpectrum, repeats: int) -> float | None:
-    if isinstance(setting.light.illuminant, LaserLine):
+def _second_light(setting: Setting, made: PolarPowerSpectrum, repeats: int) -> float | None:
+    if setting.light.is_line:
         return None
     other = setting.light.model_copy(update={"illuminant": SECOND_ILLUMINANT})
     return best_of(repeats, lambda: setting.table(made, other))[1]
@@ -95,7 +94,7 @@ def stages(setting: Setting, baked: PolarBake) -> list[Timed]:
     spline_s = seconds["filter_azimuths"] + seconds["filter_rings"]
     return [
         Timed(work.stack(setting.field, baked.built), baked.stages.stack),
-        Timed(work.spectrum(setting, baked.built, baked.made), seconds["polar_spectrum"]),
+        Timed(work.power_spectrum(setting, baked.built, baked.made), seconds["polar_spectrum"]),
         Timed(work.build_operator(setting), seconds["build_operator"]),
         Timed(work.apply_operator(setting, baked.made, baked.table), seconds["apply_operator"]),
         Timed(work.splines(baked.table), spline_s),

@@ -1,7 +1,7 @@
 """A polar table to be timed: everything that its stages are given, and the same table's integral in other hands."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 from scipy.special import jv
 
 from kernels.spectral_operator import LinePoints, RingQuadratures, w_max, w_nodes
-from pipeline.config.models import Config, LaserLine, PolarLayout, Spectrum
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.config.models import Config
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack, crop_to_window
-from pipeline.diffraction.power_spectrum import PolarSpectrum
-from pipeline.optics import brdf
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature, shortest_wavelength_nm
+from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.planning import plan
 from pipeline.tables.planning.plan import Budget, Plan
 from pipeline.tables.polar import line_points, quadrature, spectral_integral
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.layout import PolarLayout
 
 # what the terms, nodes and wavelengths of every polar table here are chosen for; its grid is given
 BUDGET = Budget(0.1, 7500.0)
@@ -44,12 +45,12 @@ class Setting:
         return self.config.coherence.sigma_um
 
     @property
-    def light(self) -> Spectrum:
-        return self.config.spectrum
+    def light(self) -> Light:
+        return self.config.light
 
     @property
     def lambda_min_nm(self) -> float:
-        return shortest_wavelength_nm(self.light)
+        return self.light.lambda_min_nm
 
     @property
     def r_max_per_um(self) -> float:
@@ -58,40 +59,42 @@ class Setting:
     @cached_property
     def radius_per_um(self) -> Array:
         """The radii of E."""
-        line = isinstance(self.light.illuminant, LaserLine)
-        spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
-        return spectrum.radii(self.sigma_um, self.r_max_per_um, spacing)
+        line = self.light.is_line
+        spacing = power_spectrum.SPACING_OF_A_LINE if line else power_spectrum.SPACING
+        return power_spectrum.radii(self.sigma_um, self.r_max_per_um, spacing)
 
     def stack(self) -> Stack:
         reach = float(self.radius_per_um[-1])
-        return spectrum.chebyshev_stack(self.field, self.sigma_um, reach, self.plan.terms, AMPLITUDE)
+        return power_spectrum.chebyshev_stack(self.field, self.sigma_um, reach, self.plan.terms, AMPLITUDE)
 
-    def spectrum(self, built: Stack) -> PolarSpectrum:
-        return spectrum.build(built, self.plan.azimuths, self.radius_per_um, self.lambda_min_nm, self.plan.s_nodes)
+    def power_spectrum(self, built: Stack) -> PolarPowerSpectrum:
+        return power_spectrum.build(
+            built, self.plan.azimuths, self.radius_per_um, self.lambda_min_nm, self.plan.s_nodes
+        )
 
     @cached_property
     def rules(self) -> RingQuadratures:
         """The wavelengths of every ring under the config's own light."""
         return self.rules_of(self.light)
 
-    def rules_of(self, light: Spectrum) -> RingQuadratures:
-        lit = partial(brdf.illumination, self.config.material, light, self.sigma_um)
+    def rules_of(self, light: Light) -> RingQuadratures:
+        lit = Radiometry(light, self.config.material, self.sigma_um).illumination
         return quadrature.choose(lit, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
 
     @cached_property
     def points(self) -> LinePoints:
         """Where the rings take E."""
-        s_max, rho = spectrum.s_max(self.lambda_min_nm), self.plan.rings.rho()
+        s_max, rho = power_spectrum.s_max(self.lambda_min_nm), self.plan.rings.rho()
         return line_points.choose(self.radius_per_um, self.plan.s_nodes, s_max, rho, self.rules)
 
-    def table(self, made: PolarSpectrum, light: Spectrum) -> polar.PolarTable:
-        reflectance = partial(brdf.spectral_reflectance, self.config.material, light)
+    def table(self, made: PolarPowerSpectrum, light: Light) -> polar.PolarTable:
+        reflectance = Radiometry(light, self.config.material, self.sigma_um).reflectance
         return polar.build(made, self.plan.rings, self.rules_of(light), self.plan.w_terms, reflectance)
 
-    def samples(self, made: PolarSpectrum) -> NDArray[np.float64]:
+    def samples(self, made: PolarPowerSpectrum) -> NDArray[np.float64]:
         """The table's samples (rings, 3, w nodes, azimuths) before splines are put through them."""
         of = made.values, made.radius_per_um, made.s_max_per_um, self.plan.rings.rho(), self.rules
-        reflectance = partial(brdf.spectral_reflectance, self.config.material, self.light)
+        reflectance = Radiometry(self.light, self.config.material, self.sigma_um).reflectance
         terms = spectral_integral.integrate(*of, self.plan.w_terms, reflectance)
         # T_k at the nodes of w, (w node, k)
         x = 2.0 * w_nodes(self.plan.w_terms) - 1.0
@@ -106,7 +109,7 @@ class Setting:
     @cached_property
     def _reflectance(self) -> NDArray[np.float32]:
         """What of R stays inside the integral, (wavelengths of all rings, w nodes)."""
-        reflectance = partial(brdf.spectral_reflectance, self.config.material, self.light)
+        reflectance = Radiometry(self.light, self.config.material, self.sigma_um).reflectance
         return spectral_integral.at_nodes(reflectance, self.plan.rings.rho(), self._w, self.rules)
 
     def rule_of_ring(self, ring: int) -> Quadrature:
@@ -128,10 +131,10 @@ class Setting:
         return np.asarray(amplitudes * np.sqrt(self._reflectance[first : first + len(phase), :, None]))
 
 
-def first_bake(field: HeightField, config: Config, layout: PolarLayout) -> tuple[PolarSpectrum, Setting]:
+def first_bake(field: HeightField, config: Config, layout: PolarLayout) -> tuple[PolarPowerSpectrum, Setting]:
     """The spectrum and the setting of a table of a layout."""
     seen = crop_to_window(field, config.coherence.sigma_um).centred()
-    made, chosen = plan.make([seen], config.coherence.sigma_um, config.spectrum, None, BUDGET, layout)
+    made, chosen = plan.make([seen], config.coherence.sigma_um, config.light, None, BUDGET, layout)
     return made, Setting(seen, config, chosen)
 
 

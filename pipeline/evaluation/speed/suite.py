@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.accuracy.checks import MAP_SIZE, RelativeError, relative_error
 from pipeline.bundle import polar_storage
 from pipeline.bundle.polar_storage import Stored
-from pipeline.config.models import Config, PolarLayout
+from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.speed import memory, nufft, plain, polar_bake, setting, transforms
 from pipeline.evaluation.speed.machine import Timed
@@ -23,6 +23,7 @@ from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar.compression import compress, most_textures, whole
+from pipeline.tables.polar.layout import PolarLayout
 
 PAPER, POLAR, TEXTURES = "paper's tables", "polar table", "polar table as RGBA16F"
 NUFFT = "polar table by FINUFFT"

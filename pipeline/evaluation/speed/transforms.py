@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from kernels.dft_stack import Kept
-from pipeline.diffraction import dft_stack as stack
+from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.evaluation.speed.setting import AMPLITUDE, Setting
 from pipeline.evaluation.speed.timing import best_of
@@ -43,10 +43,10 @@ def measure(setting: Setting, repeats: int) -> list[Transforms]:
 
 def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms:
     real, reach = _REAL[precision], float(setting.radius_per_um[-1])
-    terms, t = setting.plan.terms, np.fft.ifftshift(setting.field.heights_um) * stack.scale_per_um(setting.field)
+    terms, t = setting.plan.terms, np.fft.ifftshift(setting.field.heights_um) * dft_stack.scale_per_um(setting.field)
 
     def by_kernel() -> Stack:
-        return stack.build(setting.field, "chebyshev", terms, setting.sigma_um, reach, AMPLITUDE, dtype=real)
+        return dft_stack.build(setting.field, "chebyshev", terms, setting.sigma_um, reach, AMPLITUDE, dtype=real)
 
     kept = kept_of(by_kernel())
     shape = (*kept.shape, 2, terms)

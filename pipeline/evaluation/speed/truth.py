@@ -8,10 +8,9 @@ from pipeline.diffraction.reference import Reference
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import shortest_wavelength_nm
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Map, relative_unit, table_evaluator
+from pipeline.tables.evaluate import Map, table_evaluator
 from pipeline.tables.polar.compression import Textures
 from pipeline.tables.polar.table import PolarTable
 from pipeline.tables.taylor.table import TaylorTable
@@ -27,22 +26,24 @@ class MapTruth:
     """
 
     def __init__(self, field: HeightField, config: Config, size: int, progress: Progress = silent) -> None:
-        self._config, self._unit = config, relative_unit(config)
+        self._config, self._unit = config, config.radiometry.unit
         self._wr = Map(size, MAP_RADIUS).views()
         self._wi = np.broadcast_to(_NORMAL, self._wr.shape)
-        reference = Reference(field, config.coherence.sigma_um, shortest_wavelength_nm(config.spectrum), progress)
-        exact = reference.xyz(config.spectrum, config.material, self._wi, self._wr, progress=progress)
+        reference = Reference(field, config.coherence.sigma_um, config.light.lambda_min_nm, progress)
+        exact = reference.xyz(config.light, config.material, self._wi, self._wr, progress=progress)
         self._exact = exact / self._unit
 
     def error(self, table: PolarTable | TaylorTable) -> ColourError:
         """CIELAB errors of a table's map at 7500 RU."""
-        return self._compare(table_evaluator(table, self._config)(self._wi, self._wr))
+        return self._compare(table_evaluator(table, self._config.radiometry)(self._wi, self._wr))
 
     def error_of_textures(self, textures: Textures) -> ColourError:
         """CIELAB errors of a compressed table's map at 7500 RU."""
         uv = geometry.uvw(self._wi, self._wr)[:, :2]
         g = textures.envelope.at(np.hypot(uv[:, 0], uv[:, 1]))
-        return self._compare(g[:, None] * table_evaluator(textures.table(), self._config)(self._wi, self._wr))
+        return self._compare(
+            g[:, None] * table_evaluator(textures.table(), self._config.radiometry)(self._wi, self._wr)
+        )
 
     def _compare(self, found: Array) -> ColourError:
         difference = delta_e(found / self._unit, self._exact, EXPOSURE_RU)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.programs import ORDER
 from pipeline.diffraction.dft_stack import Stack
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.evaluation.speed.machine import Precision, Work
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.surface.heightfield import HeightField
@@ -38,14 +38,14 @@ def _nbytes(built: Stack) -> float:
     return float(built.coefficients.nbytes * built.terms / built.coefficients.shape[3])
 
 
-def spectrum(setting: Setting, built: Stack, made: PolarSpectrum) -> Work:
+def power_spectrum(setting: Setting, built: Stack, made: PolarPowerSpectrum) -> Work:
     """polar_spectrum: the window over every term, then the series at every node in s, for half of the azimuths."""
     pairs = _pairs_in_band(made)
     flops = 2.0 * pairs * built.terms * 2 * (taps(built) + setting.plan.s_nodes)
-    return Work("spectrum", "single", flops, _nbytes(built) + made.values.nbytes)
+    return Work("power spectrum", "single", flops, _nbytes(built) + made.values.nbytes)
 
 
-def _pairs_in_band(made: PolarSpectrum) -> int:
+def _pairs_in_band(made: PolarPowerSpectrum) -> int:
     """Radii and azimuths of half a turn within the scan's band."""
     phi = made.azimuths.angles()[: made.azimuths.count // 2]
     fx, fy = (np.abs(np.outer(made.radius_per_um, along)) for along in (np.cos(phi), np.sin(phi)))
@@ -61,7 +61,7 @@ def build_operator(setting: Setting) -> Work:
     return Work("build_operator", "single", flops, 4.0 * w * (points * s + 3 * taken))
 
 
-def apply_operator(setting: Setting, made: PolarSpectrum, table: PolarTable) -> Work:
+def apply_operator(setting: Setting, made: PolarPowerSpectrum, table: PolarTable) -> Work:
     """At every point: E over r where it lies between radii, then over s; every ring's X, Y, Z; w's series at last."""
     s, w = setting.plan.s_nodes, setting.plan.w_terms
     points, between, taken = _points(setting)

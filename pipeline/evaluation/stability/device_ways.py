@@ -5,15 +5,13 @@ from math import pi
 import numpy as np
 
 from kernels.polar_spectrum import LANES
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import dft_stack, expansion, power_spectrum
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.stability.cell import LAMBDA_MIN_NM, SEED, Cell
 from pipeline.evaluation.stability.reading import MOST_WORK, Reading, readings
 from pipeline.evaluation.stability.series_way import CUT
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import table as taylor
 
@@ -27,9 +25,9 @@ def reference(cell: Cell, field: HeightField) -> list[Reading]:
     return readings(cell, field, lambda uvw, nm: exact.power(uvw, np.array([nm]))[:, 0])
 
 
-def plan_taylor(field: HeightField) -> series.TaylorPlan:
+def plan_taylor(field: HeightField) -> expansion.TaylorPlan:
     """The paper's table for this surface at the shortest wavelength. Raises AccuracyError where it must refuse."""
-    return series.plan_taylor(field, one_wavelength(LAMBDA_MIN_NM), TAYLOR_TOLERANCE)
+    return expansion.plan_taylor(field, one_wavelength(LAMBDA_MIN_NM), TAYLOR_TOLERANCE)
 
 
 def one_wavelength(lambda_nm: float) -> Quadrature:
@@ -39,9 +37,9 @@ def one_wavelength(lambda_nm: float) -> Quadrature:
 
 def taylor_tables(cell: Cell, field: HeightField) -> list[Reading]:
     """I_p at the directions' own (u, v), kept in float32 as tables keep them, and eq. 10's sum."""
-    order, reachable = plan_taylor(field).order, series.W_MAX / (1e-3 * LAMBDA_MIN_NM)
-    cut = stack.window_tolerance(TAYLOR_TOLERANCE)
-    built = stack.build(field, "taylor", order + 1, cell.sigma_um, reachable, cut)
+    order, reachable = plan_taylor(field).order, expansion.W_MAX / (1e-3 * LAMBDA_MIN_NM)
+    cut = dft_stack.window_tolerance(TAYLOR_TOLERANCE)
+    built = dft_stack.build(field, "taylor", order + 1, cell.sigma_um, reachable, cut)
 
     def power(uvw: Array, nm: float) -> Array:
         # I_p(-u, -v) = (-1)^p I_p(u, v): the half plane u < 0 is the other one at -w
@@ -53,16 +51,16 @@ def taylor_tables(cell: Cell, field: HeightField) -> list[Reading]:
     return readings(cell, field, power)
 
 
-def power_spectrum(cell: Cell, field: HeightField) -> list[Reading]:
+def polar_power(cell: Cell, field: HeightField) -> list[Reading]:
     """E of the float32 Chebyshev stack at some of its own nodes, where nothing is interpolated."""
-    terms = series.chebyshev_order(series.largest_phase(field.half_range_um, LAMBDA_MIN_NM), CUT) + 1
+    terms = expansion.chebyshev_order(expansion.largest_phase(field.half_range_um, LAMBDA_MIN_NM), CUT) + 1
     # few sizes, so that few kernels are compiled; what is too many adds terms that are nothing
     terms = LANES * 2 ** int(np.ceil(np.log2(terms / LANES).clip(0.0)))
-    radius = spectrum.radii(cell.sigma_um, series.W_MAX / (1e-3 * LAMBDA_MIN_NM))
-    built = spectrum.chebyshev_stack(field, cell.sigma_um, float(radius[-1]), terms, CUT)
+    radius = power_spectrum.radii(cell.sigma_um, expansion.W_MAX / (1e-3 * LAMBDA_MIN_NM))
+    built = power_spectrum.chebyshev_stack(field, cell.sigma_um, float(radius[-1]), terms, CUT)
     half = pi * np.arange(LANES) / LANES
-    values = spectrum.gather(built, half, radius, LAMBDA_MIN_NM, _S_NODES)
-    s = spectrum.s_nodes(_S_NODES, spectrum.s_max(LAMBDA_MIN_NM))
+    values = power_spectrum.gather(built, half, radius, LAMBDA_MIN_NM, _S_NODES)
+    s = power_spectrum.s_nodes(_S_NODES, power_spectrum.s_max(LAMBDA_MIN_NM))
     turn, i, j, lane = _nodes(cell, len(radius))
     phi, lambda_um = half[lane] + pi * turn, 1e-3 * LAMBDA_MIN_NM
     f = radius[i, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import expansion
 from pipeline.diffraction.dft_stack import Basis
 from pipeline.errors import AccuracyError, BakeError
 from pipeline.evaluation.stability import device_ways
@@ -35,7 +35,7 @@ _READINGS: dict[tuple[Way, Basis, Precision], Callable[[Cell, HeightField], list
     ("series", "chebyshev", "float32"): in_memory,
     ("series", "chebyshev", "float64"): in_memory,
     ("device", "taylor", "float32"): device_ways.taylor_tables,
-    ("device", "chebyshev", "float32"): device_ways.power_spectrum,
+    ("device", "chebyshev", "float32"): device_ways.polar_power,
     ("device", "chebyshev", "float64"): device_ways.reference,
 }
 
@@ -77,7 +77,7 @@ def promise(cell: Cell, field: HeightField) -> Promise:
     if cell.way == "table":
         return Promise(_SAMPLING * TABLE_DELTA_E, 1.0)
     if cell.basis == "taylor":
-        return Promise(TAYLOR_TOLERANCE, series.MIRROR_SHARE)
+        return Promise(TAYLOR_TOLERANCE, expansion.MIRROR_SHARE)
     if cell.precision == "float64":
         return Promise(_REFERENCE_TOLERANCE, 1.0)
     return Promise(CHEBYSHEV_TOLERANCE, _DARK_SHARE * mean_level(field, cell.sigma_um))

@@ -5,8 +5,7 @@ from math import pi
 import numpy as np
 from scipy.special import jv
 
-from pipeline.diffraction import dft_stack as stack
-from pipeline.diffraction import expansion as series
+from pipeline.diffraction import dft_stack, expansion
 from pipeline.evaluation.stability.cell import LAMBDA_MIN_NM, Cell
 from pipeline.evaluation.stability.reading import Reading, readings
 from pipeline.optics.coherence import sigma_f
@@ -20,16 +19,16 @@ _MOST_TAYLOR_TERMS = 400
 
 def in_memory(cell: Cell, field: HeightField) -> list[Reading]:
     """A stack summed in memory, with as many terms as the series can use."""
-    z = series.largest_phase(field.half_range_um, LAMBDA_MIN_NM)
+    z = expansion.largest_phase(field.half_range_um, LAMBDA_MIN_NM)
     # z^(N+1) / (N+1)! is nothing from N = e z on; the series dies of its rounding long before the cap
     taylor_terms = min(_MOST_TAYLOR_TERMS, int(3.6 * z) + 30)
-    terms = taylor_terms if cell.basis == "taylor" else series.chebyshev_order(z, CUT) + 1
-    reachable = series.W_MAX / (1e-3 * LAMBDA_MIN_NM)
-    built = stack.build(field, cell.basis, terms, cell.sigma_um, reachable, CUT, dtype=np.dtype(cell.precision))
+    terms = taylor_terms if cell.basis == "taylor" else expansion.chebyshev_order(z, CUT) + 1
+    reachable = expansion.W_MAX / (1e-3 * LAMBDA_MIN_NM)
+    built = dft_stack.build(field, cell.basis, terms, cell.sigma_um, reachable, CUT, dtype=np.dtype(cell.precision))
     return readings(cell, field, lambda uvw, nm: series_power(built, uvw, nm))
 
 
-def series_power(built: stack.Stack, uvw: Array, lambda_nm: float) -> Array:
+def series_power(built: dft_stack.Stack, uvw: Array, lambda_nm: float) -> Array:
     """|P|^2 (directions,) = |sum_n c_n F_n(f)|^2 of a stack, sums and factors in its own precision.
 
     NaN beyond the scan's band. The window's taps are those of the kernels: nearest coefficient +- reach.
@@ -58,7 +57,7 @@ def series_power(built: stack.Stack, uvw: Array, lambda_nm: float) -> Array:
     return power
 
 
-def _factors(built: stack.Stack, s_per_um: Array) -> Array:
+def _factors(built: dft_stack.Stack, s_per_um: Array) -> Array:
     """c_n(s) (directions, terms), s = k w: (i s H)^n / n!, or (2 - [n = 0]) i^n J_n(s H)."""
     n, phase = np.arange(built.terms), s_per_um[:, None] * built.half_range_um
     if built.basis == "chebyshev":

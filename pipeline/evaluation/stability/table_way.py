@@ -6,17 +6,20 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pipeline.config.models import Accuracy, Coherence, Config, Mirror, Surface
-from pipeline.diffraction.reference import reference_evaluator
+from pipeline.accuracy.exact import reference_evaluator
+from pipeline.config.models import Accuracy, Config
 from pipeline.evaluation.stability.cell import SEED, Cell
 from pipeline.evaluation.stability.reading import NO_DIGITS
 from pipeline.optics import geometry
+from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import run, surface, table
 from pipeline.store.store import Store
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Mirror
+from pipeline.surface.source import SurfaceSource
 from pipeline.tables.evaluate import table_evaluator
 
 TABLE_DELTA_E = 0.5
@@ -26,9 +29,9 @@ def _config(cell: Cell, heights: Path) -> Config:
     """What a table cell is baked and certified under, its surface in a file; a file of one height is refused."""
     if cell.kind == "flat":
         (ny, nx), (px, py) = cell.shape, cell.pitch_um
-        section = Surface(recipe=Mirror(kind="mirror", size_um=(nx * px, ny * py), pitch_um=cell.pitch_um))
+        section = SurfaceSource(recipe=Mirror(kind="mirror", size_um=(nx * px, ny * py), pitch_um=cell.pitch_um))
     else:
-        section = Surface(path=str(heights), height_unit="um", pitch_um=cell.pitch_um, level="none")
+        section = SurfaceSource(path=str(heights), height_unit="um", pitch_um=cell.pitch_um, level="none")
     coherence, accuracy = Coherence(sigma_um=cell.sigma_um), Accuracy(delta_e=TABLE_DELTA_E)
     return Config(name="stress", surface=section, coherence=coherence, accuracy=accuracy)
 
@@ -45,7 +48,7 @@ def table_error(cell: Cell, field: HeightField) -> float:
         made = run.execute(config, run.plan(config, store, "table"), store)
         baked = table.load(config, store.open("table", made["table"].key))
         field = surface.load(store.open("surface", made["surface"].key))
-    evaluate = table_evaluator(baked, config)
+    evaluate = table_evaluator(baked, config.radiometry)
     wi, wr = random_pairs(None, 1000, SEED)
     found = evaluate(wi, wr)
     if not (np.all(np.isfinite(found)) and np.all(np.isfinite(evaluate(*_extreme_pairs())))):

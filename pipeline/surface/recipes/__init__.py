@@ -6,33 +6,44 @@ construction a file: `gratings.py`, `disc.py`, `random.py`, `snakes.py`.
 
 from typing import assert_never
 
-from pipeline.config import models as config
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import disc, gratings, random, snakes
+from pipeline.surface.recipes.parameters import (
+    Blazed,
+    CompactDisc,
+    Elaphe,
+    GaussianRandom,
+    Mirror,
+    Recipe,
+    Rectangular,
+    Sinusoid,
+    TiltedMirror,
+    Xenopeltis,
+)
 
 
-def make(recipe: config.Recipe) -> HeightField:
+def make(recipe: Recipe) -> HeightField:
     """The height field of one recipe: float64 um, y up, the same for the same recipe.
 
     Gratings, discs, random and snake surfaces repeat across the patch's seams without a step; a tilted
     mirror cannot. Raises ConfigError where the pitch cannot carry the structure asked for.
     """
     match recipe:
-        case config.Mirror() | config.TiltedMirror():
+        case Mirror() | TiltedMirror():
             return gratings.mirror(recipe)
-        case config.Sinusoid():
+        case Sinusoid():
             return gratings.sinusoid(recipe)
-        case config.Rectangular():
+        case Rectangular():
             return gratings.rectangular(recipe)
-        case config.Blazed():
+        case Blazed():
             return gratings.blazed(recipe)
-        case config.CompactDisc():
+        case CompactDisc():
             return disc.compact_disc(recipe)
-        case config.GaussianRandom():
+        case GaussianRandom():
             return random.gaussian(recipe)
-        case config.Elaphe():
+        case Elaphe():
             return snakes.elaphe(recipe)
-        case config.Xenopeltis():
+        case Xenopeltis():
             return snakes.xenopeltis(recipe)
         case _:
             assert_never(recipe)

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import CompactDisc
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import CompactDisc
 from pipeline.surface.recipes.patch import LONGEST_RUN, SHORTEST_RUN, Axis, generator, patch_of
 
 

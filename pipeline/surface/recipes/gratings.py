@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import Blazed, Mirror, Rectangular, Sinusoid, TiltedMirror
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Blazed, Mirror, Rectangular, Sinusoid, TiltedMirror
 from pipeline.surface.recipes.patch import Axis, Patch, patch_of
 
 

@@ -7,7 +7,8 @@ from typing import assert_never
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import (
+from pipeline.errors import ConfigError
+from pipeline.surface.recipes.parameters import (
     Blazed,
     CompactDisc,
     Elaphe,
@@ -19,9 +20,8 @@ from pipeline.config.models import (
     Sinusoid,
     TiltedMirror,
     Xenopeltis,
-    as_pair,
 )
-from pipeline.errors import ConfigError
+from pipeline.validated import as_pair
 
 # 8 GiB a field: past this a size or a pitch is in the wrong unit
 _MOST_SAMPLES = 2**30

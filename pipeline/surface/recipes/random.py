@@ -4,10 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from pipeline.config.models import GaussianRandom, as_pair
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import GaussianRandom
 from pipeline.surface.recipes.patch import Axis, generator, patch_of
+from pipeline.validated import as_pair
 
 
 def gaussian(recipe: GaussianRandom) -> HeightField:

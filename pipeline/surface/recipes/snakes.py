@@ -7,9 +7,9 @@ is exactly periodic; shapes were matched by eye and by power spectrum to AFM sca
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.models import Elaphe, Xenopeltis
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Elaphe, Xenopeltis
 from pipeline.surface.recipes.patch import Axis, Patch, generator, patch_of
 from pipeline.surface.recipes.random import lowpass, smooth_noise
 

@@ -1,16 +1,16 @@
 """What polar tables of every grid are made of: a stack, and the nodes, terms and light that all of them share."""
 
 from dataclasses import dataclass
-from functools import partial
 
 from kernels.spectral_operator import RingQuadratures
-from pipeline.config.models import LaserLine, Material, Spectrum
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.polar_grid import Azimuths, Rings
-from pipeline.diffraction.power_spectrum import PolarSpectrum
-from pipeline.optics import brdf
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import Light
+from pipeline.optics.material import Material
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.table import PolarTable
@@ -28,23 +28,23 @@ class Ingredients:
     radius_per_um: Array
     s_nodes: int
     w_terms: int
-    light: Spectrum
+    light: Light
     lambda_min_nm: float
     quadrature_error: float
 
     @property
     def is_line(self) -> bool:
-        return isinstance(self.light.illuminant, LaserLine)
+        return self.light.is_line
 
-    def spectrum(self, azimuths: Azimuths) -> PolarSpectrum:
+    def power_spectrum(self, azimuths: Azimuths) -> PolarPowerSpectrum:
         """E on these azimuths."""
-        return spectrum.build(self.stack, azimuths, self.radius_per_um, self.lambda_min_nm, self.s_nodes)
+        return power_spectrum.build(self.stack, azimuths, self.radius_per_um, self.lambda_min_nm, self.s_nodes)
 
     def rules(self, rho: Array) -> RingQuadratures:
         """Wavelengths of every ring."""
-        light = partial(brdf.integrand, Material(), self.light, self.stack.sigma_um)
+        light = Radiometry(self.light, Material(), self.stack.sigma_um).integrand
         return quadrature.choose(light, rho, self.stack.sigma_um, self.quadrature_error)
 
-    def table(self, made: PolarSpectrum, rings: Rings) -> PolarTable:
+    def table(self, made: PolarPowerSpectrum, rings: Rings) -> PolarTable:
         """The table of E on these rings."""
         return polar.build(made, rings, self.rules(rings.rho()), self.w_terms)

@@ -9,14 +9,15 @@ from math import asinh, ceil, sqrt
 
 import numpy as np
 
-from pipeline.config.models import PolarLayout, Scene
 from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.errors import AccuracyError
 from pipeline.optics.coherence import sigma_f
+from pipeline.optics.scene import Scene
 from pipeline.tables.planning.anisotropy import anisotropy
 from pipeline.tables.planning.candidate import Ingredients
 from pipeline.tables.planning.probes import Probes
+from pipeline.tables.polar.layout import PolarLayout
 
 _GRID_SHARE = 0.65  # of the budget, by rings and azimuths as the probes see it
 _MOST_BYTES = 3 * 2**30
@@ -43,20 +44,20 @@ class GridSearch:
         self._of, self._layout, self._scene = of, layout, scene
         self._rho_max, self._delta_e, self._exposure_ru = rho_max, delta_e, exposure_ru
         self._stretch, self._axis = anisotropy(of.stack)
-        self._made: PolarSpectrum | None = None
+        self._made: PolarPowerSpectrum | None = None
 
-    def run(self) -> tuple[PolarSpectrum, Rings, float | None]:
+    def run(self) -> tuple[PolarPowerSpectrum, Rings, float | None]:
         """E on the azimuths chosen, the rings, and the mean error at the probes, None where nothing was searched.
 
         Raises AccuracyError where E would not fit into memory.
         """
         rings, azimuths = self._start()
         # what does not fit is refused before anything is measured
-        self._spectrum(azimuths)
+        self._power_spectrum(azimuths)
         error = None
         if "auto" in (self._layout.rings, self._layout.azimuths):
             rings, azimuths, error = self._smallest(rings, azimuths)
-        return self._spectrum(azimuths), self._rings(rings), error
+        return self._power_spectrum(azimuths), self._rings(rings), error
 
     def _start(self) -> tuple[int, int]:
         """Rings and azimuths to begin with: both follow the window, and the error falls with their square."""
@@ -91,7 +92,7 @@ class GridSearch:
     def _rings(self, count: int) -> Rings:
         return Rings(count, self._r0, self._rho_max)
 
-    def _spectrum(self, azimuths: int) -> PolarSpectrum:
+    def _power_spectrum(self, azimuths: int) -> PolarPowerSpectrum:
         """E on so many azimuths: the last one is kept, for the search varies rings in between."""
         if self._made is None or self._made.azimuths.count != azimuths:
             need = 4 * azimuths * self._of.s_nodes * len(self._of.radius_per_um)
@@ -103,7 +104,7 @@ class GridSearch:
                 )
             # its memory may serve the next one
             self._made = None
-            self._made = self._of.spectrum(Azimuths(azimuths, self._stretch, self._axis))
+            self._made = self._of.power_spectrum(Azimuths(azimuths, self._stretch, self._axis))
         return self._made
 
     def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
@@ -154,7 +155,7 @@ class GridSearch:
 
     def _error(self, rings: int, azimuths: int) -> float:
         """Mean CIELAB error at the probes of a table of this size."""
-        return self._probes.error(self._of.table(self._spectrum(azimuths), self._rings(rings)))
+        return self._probes.error(self._of.table(self._power_spectrum(azimuths), self._rings(rings)))
 
 
 def _other(count: int, coarser: int) -> int:

@@ -10,15 +10,15 @@ from math import ceil
 
 import numpy as np
 
-from pipeline.config.models import LaserLine, PolarLayout, Scene, Spectrum
-from pipeline.diffraction import expansion as series
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, Rings
-from pipeline.optics.spectra import shortest_wavelength_nm
+from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.planning.candidate import Ingredients
 from pipeline.tables.planning.grid_search import GridSearch
+from pipeline.tables.polar.layout import PolarLayout
 
 # shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
 AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
@@ -68,57 +68,57 @@ def rho_max(scene: Scene | None) -> float:
 def make(
     fields: Sequence[HeightField],
     sigma_um: float,
-    light: Spectrum,
+    light: Light,
     scene: Scene | None,
     budget: Budget,
     layout: PolarLayout,
     progress: Progress = silent,
-) -> tuple[spectrum.PolarSpectrum, Plan]:
+) -> tuple[power_spectrum.PolarPowerSpectrum, Plan]:
     """The power spectrum on the azimuths that the budget asks for, and the whole plan.
 
     `fields` are the places of the window (pipeline.surface.windows); E is their mean, planned on the first. Of the
     light only its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of reach or E
     would not fit into memory.
     """
-    lambda_min, outer = shortest_wavelength_nm(light), rho_max(scene)
-    z = series.largest_phase(max(field.half_range_um for field in fields), lambda_min)
+    lambda_min, outer = light.lambda_min_nm, rho_max(scene)
+    z = expansion.largest_phase(max(field.half_range_um for field in fields), lambda_min)
     amplitude = AMPLITUDE_SHARE * budget.delta_e
-    terms = series.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
-    nodes = series.chebyshev_order(spectrum.S_REACH * z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
+    terms = expansion.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
+    nodes = expansion.chebyshev_order(power_spectrum.S_REACH * z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
     light = _probing_light(light, layout)
-    line = isinstance(light.illuminant, LaserLine)
-    spacing = spectrum.SPACING_OF_A_LINE if line else spectrum.SPACING
-    radius = spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
-    built = spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
+    line = light.is_line
+    spacing = power_spectrum.SPACING_OF_A_LINE if line else power_spectrum.SPACING
+    radius = power_spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
+    built = power_spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
     w_terms = (
         _w_terms(z * lambda_min / _middle_nm(light), light, budget) if layout.w_terms == "auto" else layout.w_terms
     )
     of = Ingredients(built, radius, nodes, w_terms, light, lambda_min, budget.quadrature)
     made, rings, error = GridSearch(of, layout, scene, outer, budget.delta_e, budget.exposure_ru).run()
     for field in fields[1:]:
-        built = spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
-        made.values[...] += spectrum.build(built, made.azimuths, radius, lambda_min, nodes).values
+        built = power_spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
+        made.values[...] += power_spectrum.build(built, made.azimuths, radius, lambda_min, nodes).values
     made.values[...] /= np.float32(len(fields))
     return made, Plan(terms, nodes, w_terms, made.azimuths, rings, error)
 
 
-def _w_terms(phase: float, light: Spectrum, budget: Budget) -> int:
+def _w_terms(phase: float, light: Light, budget: Budget) -> int:
     """Terms in |w|, in fours, for k |w| H at the luminous middle: white light's blue end hardly counts."""
-    share = _W_SHARE_OF_A_LINE if isinstance(light.illuminant, LaserLine) else _W_SHARE
-    return 4 * ceil((series.chebyshev_order(phase, share * min(0.1, budget.delta_e)) + 1) / 4)
+    share = _W_SHARE_OF_A_LINE if light.is_line else _W_SHARE
+    return 4 * ceil((expansion.chebyshev_order(phase, share * min(0.1, budget.delta_e)) + 1) / 4)
 
 
-def _probing_light(light: Spectrum, layout: PolarLayout) -> Spectrum:
+def _probing_light(light: Light, layout: PolarLayout) -> Light:
     """What the grid is planned under: E serves every illuminant of a range, so equal energy, or else one line."""
-    if isinstance(light.illuminant, LaserLine):
+    if light.is_line:
         return light
     if layout.form == "spectral":
-        return Spectrum(illuminant=LaserLine(lambda_nm=_middle_nm(light)))
-    return Spectrum(illuminant="E", range_nm=light.range_nm)
+        return Light(illuminant=LaserLine(lambda_nm=_middle_nm(light)))
+    return Light(illuminant="E", range_nm=light.range_nm)
 
 
-def _middle_nm(light: Spectrum) -> float:
+def _middle_nm(light: Light) -> float:
     """The wavelength of a light that the eye weighs most."""
-    if isinstance(light.illuminant, LaserLine):
-        return light.illuminant.lambda_nm
+    if light.is_line:
+        return light.lambda_min_nm
     return float(np.clip(_LUMINOUS_NM, *light.range_nm))

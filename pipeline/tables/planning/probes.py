@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from pipeline.config.models import Material, Scene
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction import power_spectrum
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import trapezoid
+from pipeline.optics.material import Material
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.scene import Scene
 from pipeline.tables.planning.anisotropy import probing_angles
 from pipeline.tables.planning.candidate import Ingredients
 from pipeline.tables.polar import spectral_integral
@@ -48,16 +49,16 @@ class Probes:
 
     def error(self, table: polar.PolarTable) -> float:
         """Mean CIELAB error of a table."""
-        found = np.nan_to_num(polar.look_up(table, self._uvw))
+        found = np.nan_to_num(table.look_up(self._uvw))
         error = delta_e(self._factor * found, self._factor * self._exact, self._exposure_ru)
         return float(np.average(error, weights=self._counts))
 
 
 def _exact(of: Ingredients, half_turn: Array, rho: Array, w: Array) -> Array:
     """XYZ / (C cos ti) (rhos, angles, 3) on rings `rho` at both half turns' angles, for `w` (rhos, angles)."""
-    found = spectrum.gather(of.stack, half_turn, of.radius_per_um, of.lambda_min_nm, of.s_nodes)
+    found = power_spectrum.gather(of.stack, half_turn, of.radius_per_um, of.lambda_min_nm, of.s_nodes)
     rules = of.rules(rho)
-    s_max, w_terms = spectrum.s_max(of.lambda_min_nm), of.w_terms + _SPARE_W_TERMS
+    s_max, w_terms = power_spectrum.s_max(of.lambda_min_nm), of.w_terms + _SPARE_W_TERMS
     terms = spectral_integral.integrate(found, of.radius_per_um, s_max, rho, rules, w_terms)
     x = polar.w_position(rho[:, None], w)
     cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
-from pipeline.config.models import Scene
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.optics import geometry
 from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
+from pipeline.optics.scene import Scene
 from pipeline.tables.polar.table import PolarTable, w_position
 
 CHANNELS = 4  # outputs of one texture: RGBA

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.spectral_operator import RingQuadratures as RingQuadratures
-from pipeline.config.models import FINE_STEP_NM
 from pipeline.errors import AccuracyError
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import FINE_STEP_NM, Quadrature
 
 _STEPS_NM = (20.0, 10.0, 5.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
 # the window's autocorrelation squared, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
@@ -55,7 +54,7 @@ def choose(
         rules.append(finer)
         response = response_finer
     raise AccuracyError(
-        f"the spectrum's lines need wavelengths closer than {_STEPS_NM[-2]} nm for an error of {tolerance:.1g}; "
+        f"wavelength quadrature needs steps finer than {_STEPS_NM[-2]} nm for an error of {tolerance:.1g}; "
         "raise accuracy.delta_e, or narrow spectrum.range_nm"
     )
 
@@ -74,7 +73,7 @@ def uniform(rule: Quadrature, rings: int) -> RingQuadratures:
 
 
 def _points(y_max: float, rule: Quadrature) -> int:
-    """Samples of D over [0, y_max] that follow its fastest beat, between the two ends of the spectrum."""
+    """Samples of D over [0, y_max] that follow its fastest beat, between the two ends of the light's range."""
     beat = 1e3 / rule.lambda_nm[0] - 1e3 / rule.lambda_nm[-1]
     return max(_GRID_POINTS, int(1.5 * beat * y_max))
 

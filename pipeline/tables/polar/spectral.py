@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.spectral_operator import chebyshev
-from pipeline.diffraction.power_spectrum import PolarSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.geometry import Array
 
 _ORDER = 8  # radii about each; four leave ten times the error
@@ -25,19 +25,19 @@ class SpectralTable:
     """
 
     values: NDArray[np.float32]
-    source: PolarSpectrum
+    source: PolarPowerSpectrum
 
 
-def build(spectrum: PolarSpectrum) -> SpectralTable:
+def build(power: PolarPowerSpectrum) -> SpectralTable:
     """The spectral table of a power spectrum."""
-    tiles, radii, nodes, lanes = spectrum.values.shape
-    e = np.moveaxis(spectrum.values, 3, 1).reshape(tiles * lanes, radii, nodes)
+    tiles, radii, nodes, lanes = power.values.shape
+    e = np.moveaxis(power.values, 3, 1).reshape(tiles * lanes, radii, nodes)
     terms, _ = chebyshev(nodes)
     in_s = e @ terms.T.astype(np.float32)
     # samples of a periodic spline are its coefficients seen through (1, 4, 1) / 6
     through = (4.0 + 2.0 * np.cos(2.0 * np.pi * np.fft.rfftfreq(len(e)))) / 6.0
     values = np.fft.irfft(np.fft.rfft(in_s, axis=0) / through[:, None, None], len(e), axis=0)
-    return SpectralTable(values.astype(np.float32), spectrum)
+    return SpectralTable(values.astype(np.float32), power)
 
 
 def look_up(table: SpectralTable, uvw: Array, lambda_nm: Array) -> Array:

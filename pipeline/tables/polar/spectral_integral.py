@@ -20,7 +20,7 @@ Reflectance = Callable[[Array, Array], Array]
 
 
 def integrate(
-    spectrum: NDArray[np.float32],
+    power: NDArray[np.float32],
     radius_per_um: Array,
     s_max_per_um: float,
     rho: Array,
@@ -30,10 +30,10 @@ def integrate(
 ) -> NDArray[np.float32]:
     """XYZ / (C cos ti) as Chebyshev terms of |w|, (rings, 3, w terms, azimuths).
 
-    `spectrum` is E as `PolarSpectrum` keeps it; `rho` ascends. Raises AccuracyError where the heights ask for more
-    than memory holds.
+    `power` is E as `PolarPowerSpectrum` keeps it; `rho` ascends. Raises AccuracyError where the heights ask
+    for more than memory holds.
     """
-    s_nodes = spectrum.shape[2]
+    s_nodes = power.shape[2]
     points = line_points.choose(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
     need = 4 * len(points.place) * s_nodes * w_terms
     if need > _MOST_BYTES:
@@ -42,7 +42,7 @@ def integrate(
             f"{_MOST_BYTES >> 30}; lower them (a scan's outliers: surface.clip_percentile), or raise accuracy.delta_e"
         )
     reflected = at_nodes(reflectance, rho, spectral_operator.group_w(rho, points, w_terms), quadratures)
-    terms = spectral_operator.integrate(spectrum, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
+    terms = spectral_operator.integrate(power, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
     return terms.reshape(len(rho), 3, w_terms, -1)
 
 

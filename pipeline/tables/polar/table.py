@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from kernels import cubic_spline
 from kernels.spectral_operator import RingQuadratures
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
-from pipeline.diffraction.power_spectrum import PolarSpectrum
-from pipeline.optics.brdf import grey
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.optics.brdf import Radiometry, geometry_factor, grey
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.spectral_integral import Reflectance
 
@@ -39,9 +39,28 @@ class PolarTable:
     def w_terms(self) -> int:
         return int(self.values.shape[2])
 
+    def look_up(self, uvw: Array) -> Array:
+        """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the grid's rings."""
+        rings, azimuths = self.grid.rings, self.grid.azimuths
+        rho = np.hypot(uvw[:, 0], uvw[:, 1])
+        ring = rings.index(rho)
+        # rounding may carry a direction of the rim itself past the last ring
+        inside = ring <= rings.count - 1 + 1e-6
+        place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
+        flat = self.values.reshape(rings.count, -1, azimuths.count)
+        found = cubic_spline.look_up(flat, *place).astype(np.float64)
+        found[~inside] = np.nan
+        return found
+
+    def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+        """C cos(ti) (directions,); the table holds a metal's reflectance at every angle, which leaves G and w."""
+        if radiometry.material.fresnel == "conductor":
+            return geometry_factor(radiometry.material, wi, wr)
+        return radiometry.direction_factor(wi, wr)
+
 
 def build(
-    spectrum: PolarSpectrum,
+    power: PolarPowerSpectrum,
     rings: Rings,
     quadratures: RingQuadratures,
     w_terms: int,
@@ -49,30 +68,16 @@ def build(
 ) -> PolarTable:
     """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
     rho = rings.rho()
-    of = spectrum.values, spectrum.radius_per_um, spectrum.s_max_per_um
+    of = power.values, power.radius_per_um, power.s_max_per_um
     samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
     values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
-    return PolarTable(values, PolarGrid(rings, spectrum.azimuths))
+    return PolarTable(values, PolarGrid(rings, power.azimuths))
 
 
 def w_position(rho: Array, w: Array) -> Array:
     """x = 2 |w| / w_max - 1 in [-1, 1]."""
     w_max = np.sqrt(np.maximum(4.0 - rho**2, _LEAST_W2))
     return np.asarray(np.clip(2.0 * np.abs(w) / w_max - 1.0, -1.0, 1.0))
-
-
-def look_up(table: PolarTable, uvw: Array) -> Array:
-    """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the grid's rings."""
-    rings, azimuths = table.grid.rings, table.grid.azimuths
-    rho = np.hypot(uvw[:, 0], uvw[:, 1])
-    ring = rings.index(rho)
-    # rounding may carry a direction of the rim itself past the last ring
-    inside = ring <= rings.count - 1 + 1e-6
-    place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
-    flat = table.values.reshape(rings.count, -1, azimuths.count)
-    found = cubic_spline.look_up(flat, *place).astype(np.float64)
-    found[~inside] = np.nan
-    return found
 
 
 def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quadrature) -> float:

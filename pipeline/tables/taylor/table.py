@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import diffraction
-from pipeline.config.models import Scene
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.upload import upload
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.geometry import Array
-from pipeline.optics.spectra import Quadrature
+from pipeline.optics.light import Quadrature
+from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.tables.taylor import grid
 
@@ -47,6 +48,32 @@ class TaylorTable:
         inside = np.hypot(u[:, None], u) <= grid.U_MAX
         area = np.outer(width, width) * (inside & self.computed)
         return float(np.sum(area * self.unknown) / max(np.sum(area), np.finfo(float).tiny))
+
+    def look_up(self, uvw: Array) -> Array:
+        """sum_p w^p I_p (directions, 3) at `uvw` (directions, 3), bilinear between nodes.
+
+        NaN where a neighbour was not computed: the scene the table was made for does not reach there.
+        """
+        n = self.resolution
+        column, row = (grid.node_index(uvw[:, axis], n, self.power) for axis in (0, 1))
+        left, bottom = (np.clip(np.floor(index).astype(int), 0, n - 2) for index in (column, row))
+        a, b = column - left, row - bottom
+        total = np.zeros((len(uvw), 3))
+        for down, right, weight in (
+            (0, 0, (1 - a) * (1 - b)),
+            (0, 1, a * (1 - b)),
+            (1, 0, (1 - a) * b),
+            (1, 1, a * b),
+        ):
+            at = bottom + down, left + right
+            corner = sum_powers(self.values[at], uvw[:, 2])
+            known = self.computed[at] | (weight == 0.0)
+            total += np.where(known, weight, np.nan)[:, None] * corner
+        return total
+
+    def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+        """C cos(ti) (directions,): all that depends on the angles is outside the table."""
+        return radiometry.direction_factor(wi, wr)
 
 
 def build(
@@ -104,29 +131,6 @@ def at_directions(stack: Stack, quadrature: Quadrature, uvw: Array) -> Array:
     # I_p(-u, -v) = (-1)^p I_p(u, v): half of (u, v) is enough where w takes the turn's sign
     turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
     return sum_powers(node_values(stack, quadrature, turn[:, None] * uvw[:, :2]), turn * uvw[:, 2])
-
-
-def look_up(table: TaylorTable, uvw: Array) -> Array:
-    """sum_p w^p I_p (directions, 3) at `uvw` (directions, 3), bilinear between nodes.
-
-    NaN where a neighbour was not computed: the scene the table was made for does not reach there.
-    """
-    n = table.resolution
-    column, row = (grid.node_index(uvw[:, axis], n, table.power) for axis in (0, 1))
-    left, bottom = (np.clip(np.floor(index).astype(int), 0, n - 2) for index in (column, row))
-    a, b = column - left, row - bottom
-    total = np.zeros((len(uvw), 3))
-    for down, right, weight in (
-        (0, 0, (1 - a) * (1 - b)),
-        (0, 1, a * (1 - b)),
-        (1, 0, (1 - a) * b),
-        (1, 1, a * b),
-    ):
-        at = bottom + down, left + right
-        corner = sum_powers(table.values[at], uvw[:, 2])
-        known = table.computed[at] | (weight == 0.0)
-        total += np.where(known, weight, np.nan)[:, None] * corner
-    return total
 
 
 def _check_memory(resolution: int, powers: int) -> None:

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import Config, Material
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import energy
 from pipeline.evaluation.figures.figure import Bench, Surface
 from pipeline.evaluation.figures.order_efficiencies import LAMBDA_MIN_NM, known_gratings
 from pipeline.evaluation.methods.exact import Exact
 from pipeline.evaluation.methods.polar_table import PolarTableMethod
+from pipeline.optics.material import Material
 from pipeline.progress import silent
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField

@@ -16,7 +16,7 @@ from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.paper_look_up import PaperLookUp
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import trapezoid
 from pipeline.progress import silent
 from pipeline.surface import recipes
 from pipeline.tables.evaluate import Map
@@ -77,7 +77,7 @@ def test_both_taylor_series_are_the_sums_written_out(order: int) -> None:
     wr = np.stack([sin_theta, 0.4 * sin_theta[::-1], np.zeros(3)], axis=-1)
     wr[:, 2] = np.sqrt(1.0 - np.sum(wr**2, axis=1))
     wi = np.tile([0.0, 0.0, 1.0], (3, 1))
-    factor = brdf.direction_factor(skin.config.material, trapezoid(skin.config.spectrum, 5.0), wi, wr)
+    factor = brdf.direction_factor(skin.config.material, trapezoid(skin.config.light, 5.0), wi, wr)
     heights = skin.field.heights_um
     for series, lowest in ((centred, 0.5 * (heights.max() + heights.min())), (centred.raised(), heights.min())):
         expected = truncated_power(skin, lowest, order, geometry.uvw(wi, wr), 0.5)
@@ -90,7 +90,7 @@ def test_all_series_end_at_the_reference(bench: Bench) -> None:
     views = Map(15, 0.98)
     wi, wr = directions(views, NORMAL)
     config = bench.elaphe.config
-    exact = reference(bench.elaphe, silent).xyz(config.spectrum, config.material, wi, wr, 5.0)
+    exact = reference(bench.elaphe, silent).xyz(config.light, config.material, wi, wr, 5.0)
     taylor, chebyshev = TaylorSeries.centred(bench.elaphe, 39), ChebyshevSeries(bench.elaphe, 19)
     for found in (taylor.xyz(24, wi, wr), taylor.raised().xyz(39, wi, wr), chebyshev.xyz(19, wi, wr)):
         np.testing.assert_allclose(found, exact, rtol=1e-3, atol=1e-7)
@@ -106,7 +106,7 @@ def test_the_blaze_is_the_reference_in_closed_form(bench: Bench) -> None:
     x = np.linspace(-0.6, 0.6, 61)
     wr = np.stack([x, np.zeros_like(x), np.sqrt(1.0 - x**2)], axis=-1)
     exact = Reference(bench.blazed.field, SIGMA_UM, 380.0).xyz(
-        config.spectrum, config.material, np.tile([0.0, 0.0, 1.0], (61, 1)), wr
+        config.light, config.material, np.tile([0.0, 0.0, 1.0], (61, 1)), wr
     )[:, 1]
     closed = map_physics.blazed_luminance(config, recipe, wr)
     assert np.max(np.abs(closed - exact)) < 5e-3 * np.max(exact)

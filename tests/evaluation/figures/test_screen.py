@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 
 from pipeline.config.models import Config
-from pipeline.config.models import Surface as SurfaceSection
 from pipeline.diffraction.reference import Reference, xyz_direct
 from pipeline.evaluation.figures.laser_screen import LIGHT, Screen, bands_of, experiment
 from pipeline.optics import geometry
 from pipeline.optics.fresnel import read_columns
-from pipeline.optics.spectra import illuminant_at, trapezoid
+from pipeline.optics.light import illuminant_at, trapezoid
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.source import SurfaceSource
 
 SCREEN = Screen(LIGHT, 5)
 
 
 def config() -> Config:
     recipe = {"kind": "elaphe", "size_um": 20.0, "pitch_um": 0.1}
-    return Config(name="skin", surface=SurfaceSection.model_validate({"recipe": recipe}))
+    return Config(name="skin", surface=SurfaceSource.model_validate({"recipe": recipe}))
 
 
 def test_the_middle_is_the_mirror_direction_and_the_screen_is_parallel_to_the_beam() -> None:
@@ -73,8 +73,8 @@ def test_the_benchmark_is_the_window_in_space() -> None:
     heights = np.random.default_rng(5).uniform(-0.1, 0.1, (48, 60))
     field = HeightField(heights, (0.12, 0.1))
     wi, wr = (d[[0, 7, 12, 18]] for d in SCREEN.directions())
-    found = Reference(field, 1.2, 380.0).xyz(laser.spectrum, laser.material, wi, wr)
-    np.testing.assert_allclose(found, xyz_direct(field, 1.2, laser.spectrum, laser.material, wi, wr), rtol=1e-8)
+    found = Reference(field, 1.2, 380.0).xyz(laser.light, laser.material, wi, wr)
+    np.testing.assert_allclose(found, xyz_direct(field, 1.2, laser.light, laser.material, wi, wr), rtol=1e-8)
 
 
 def test_a_gold_mirror_shows_the_laser_in_its_spot_alone() -> None:
@@ -82,7 +82,7 @@ def test_a_gold_mirror_shows_the_laser_in_its_spot_alone() -> None:
     laser = experiment(config())
     field = HeightField(np.zeros((100, 100)), (0.1, 0.1))
     reference = Reference(field, laser.coherence.sigma_um, 380.0)
-    shown = SCREEN.show(lambda wi, wr: reference.xyz(laser.spectrum, laser.material, wi, wr))
+    shown = SCREEN.show(lambda wi, wr: reference.xyz(laser.light, laser.material, wi, wr))
     spot = shown[2, 2, 1]
     # a V-cavity hides nothing at 45 deg, and gold reflects there as at normal incidence to 2 %
     assert spot == pytest.approx(np.sqrt(0.5), rel=0.02)
@@ -102,7 +102,7 @@ def test_the_laser_is_dark_below_its_onset_and_rises_above() -> None:
     assert power[-1] == 1.0
     table = read_columns(files("pipeline.optics").joinpath("supercontinuum.csv").read_bytes(), 2, "laser")
     assert (table[0, 0], table[-1, 0]) == (380.0, 780.0)
-    assert trapezoid(experiment(config()).spectrum, 1.0).weights[:, 1].sum() == pytest.approx(1.0)
+    assert trapezoid(experiment(config()).light, 1.0).weights[:, 1].sum() == pytest.approx(1.0)
 
 
 def test_bands_are_what_rises_again_outwards() -> None:

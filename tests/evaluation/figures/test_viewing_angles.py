@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import Blazed, Config, Sinusoid
-from pipeline.config.models import Surface as SurfaceSection
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.figures import peaks, viewing_angles
@@ -16,6 +15,8 @@ from pipeline.optics.coherence import sigma_f
 from pipeline.progress import silent
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Blazed, Sinusoid
+from pipeline.surface.source import SurfaceSource
 
 pytestmark = pytest.mark.physics
 
@@ -159,7 +160,7 @@ def test_the_page_says_all_of_it() -> None:
 
 
 def _config(name: str, recipe: dict[str, object]) -> Config:
-    return Config(name=name, surface=SurfaceSection.model_validate({"recipe": recipe}))
+    return Config(name=name, surface=SurfaceSource.model_validate({"recipe": recipe}))
 
 
 def _surface(name: str, recipe: dict[str, object]) -> Surface:

@@ -22,7 +22,7 @@ def errors(method: Flss, field: HeightField, of: Config) -> np.ndarray:
     """|XYZ - exact| over max(exact, 1e-7 of the mirror) of 400 pairs of directions, both at 5 nm."""
     wi, wr = random_pairs(None, 400, seed=5)
     reference = Reference(field, of.coherence.sigma_um, 380.0)
-    exact = reference.xyz(of.spectrum, of.material, wi, wr, step_nm=PUBLISHED_STEP_NM)
+    exact = reference.xyz(of.light, of.material, wi, wr, step_nm=PUBLISHED_STEP_NM)
     return np.abs(method.xyz(wi, wr) - exact) / np.maximum(exact, DARK)
 
 
@@ -135,7 +135,7 @@ def test_oblong_patches_pixels_and_odd_counts() -> None:
 def test_a_laser_line_is_one_wavelength(elaphe: HeightField) -> None:
     of = ELAPHE.model_validate({**ELAPHE.model_dump(), "spectrum": {"illuminant": {"lambda_nm": 532.0}}})
     wi, wr = random_pairs(None, 50, seed=1)
-    exact = Reference(elaphe, SIGMA, 532.0).xyz(of.spectrum, of.material, wi, wr)
+    exact = Reference(elaphe, SIGMA, 532.0).xyz(of.light, of.material, wi, wr)
     np.testing.assert_allclose(Flss(elaphe, of, reach=FULL).xyz(wi, wr), exact, rtol=1e-3, atol=1e-9)
 
 

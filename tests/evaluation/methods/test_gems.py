@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pipeline.config import models as config
 from pipeline.config.models import Config
 from pipeline.errors import ConfigError
 from pipeline.evaluation.methods.gems import Gems
@@ -11,12 +10,14 @@ from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import displayed_srgb
 from pipeline.optics.geometry import Array
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
-from pipeline.tables.evaluate import relative_unit
+from pipeline.surface.recipes.parameters import Blazed, Mirror
+from pipeline.surface.source import SurfaceSource
 
 FLAT = HeightField(np.zeros((16, 16)), (0.1, 0.1))
-SETTINGS = Config(name="test", surface=config.Surface(recipe=config.Mirror(kind="mirror")))
+SETTINGS = Config(name="test", surface=SurfaceSource(recipe=Mirror(kind="mirror")))
 
 
 def views_at(u: Array) -> tuple[Array, Array]:
@@ -56,7 +57,7 @@ def test_each_colour_peaks_at_its_wavelength() -> None:
 
 def test_it_shows_a_blazed_grating_alike_on_both_sides() -> None:
     """[S14] 2.1: always symmetric; the surface gives nothing but its spacing."""
-    grating = make(config.Blazed(kind="blazed", size_um=40.0))
+    grating = make(Blazed(kind="blazed", size_um=40.0))
     method = Gems(grating, SETTINGS)
     assert method.spacing_um == pytest.approx(2.5, rel=2e-3)
     u = np.linspace(0.02, 0.9, 50)
@@ -73,10 +74,10 @@ def test_a_turned_grating_shows_the_same_turned() -> None:
 @pytest.mark.parametrize("normalisation", ["relative", "absolute"])
 def test_the_display_shows_the_shaders_own_colours(normalisation: str) -> None:
     """At the exposure of [render] the highlight is just white, in either normalisation."""
-    settings = SETTINGS.model_copy(update={"material": config.Material(normalisation=normalisation)})
+    settings = SETTINGS.model_copy(update={"material": Material(normalisation=normalisation)})
     wi, wr = views_at(np.array([0.0, 0.41]))
     method = Gems(FLAT, settings, 1.5)
-    shown = displayed_srgb(method.xyz(wi, wr) / relative_unit(settings), settings.render.exposure_ru)
+    shown = displayed_srgb(method.xyz(wi, wr) / settings.radiometry.unit, settings.render.exposure_ru)
     np.testing.assert_allclose(shown, np.clip(method.rgb(wi, wr), 0.0, 1.0), atol=2e-4)
     np.testing.assert_allclose(shown[0], 1.0, atol=2e-4)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.config.models import Config, Spectrum
+from pipeline.config.models import Config
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.method import Monochromatic, monochromatic_brdf
 from pipeline.optics import geometry
-from pipeline.optics.spectra import trapezoid
+from pipeline.optics.light import Light, trapezoid
 from pipeline.surface.heightfield import HeightField
 
 SIGMA_UM = 3.2
@@ -50,14 +50,14 @@ def test_it_integrates_to_the_colour(material):
     method = METHODS["exact"](rough(), config)
     rng = np.random.default_rng(1)
     wi, wr = (geometry.direction(np.arcsin(0.8 * rng.random(6)), 6.28 * rng.random(6)) for _ in range(2))
-    rule = trapezoid(config.spectrum, 1.0)
+    rule = trapezoid(config.light, 1.0)
     single = np.nan_to_num(monochromatic_brdf(method, config, wi, wr, rule.lambda_nm))
     np.testing.assert_allclose(wi[:, 2:] * (single @ rule.weights), method.xyz(wi, wr), rtol=2e-3)
 
 
 def test_methods_without_one_wavelength_say_so():
     # what they are does not depend on how many wavelengths they are made of
-    config = config_of().model_copy(update={"spectrum": Spectrum(range_nm=(540.0, 560.0))})
+    config = config_of().model_copy(update={"light": Light(range_nm=(540.0, 560.0))})
     for name in ("NMM", "GPU Gems", "D14 look-up"):
         method = METHODS[name](grating(), config)
         assert not isinstance(method, Monochromatic)

@@ -10,8 +10,8 @@ from pipeline.evaluation.methods.flss import Flss
 from pipeline.evaluation.methods.nmm import Nmm, landing
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
+from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.spectra import trapezoid
 from tests.evaluation.methods.surfaces import ELAPHE, SIGMA, config, made
 
 RANGE = (380.0, 780.0)
@@ -54,7 +54,7 @@ def test_a_mirror_is_white_in_its_own_reflection() -> None:
     of = config({"kind": "mirror", "size_um": 26.0, "pitch_um": 0.1})
     straight = np.array([[0.0, 0.0, 1.0]])
     found = Nmm(made(of), of).xyz(straight, straight)[0]
-    np.testing.assert_allclose(found, trapezoid(of.spectrum, 1.0).weights.sum(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(found, trapezoid(of.light, 1.0).weights.sum(axis=0), rtol=1e-12)
     assert found[1] == pytest.approx(1.0, rel=1e-12)
 
 
@@ -62,13 +62,13 @@ def test_the_centre_is_white_whatever_the_surface_and_nothing_else_is() -> None:
     """Inside lambda_max / X a mirror's XYZ, on Elaphe far above the truth; outside it no direction is as bright."""
     field = made(ELAPHE)
     method = Nmm(field, ELAPHE)
-    white = trapezoid(ELAPHE.spectrum, 1.0).weights.sum(axis=0)
+    white = trapezoid(ELAPHE.light, 1.0).weights.sum(axis=0)
     assert method.white_radius == pytest.approx(0.78 / min(field.size_um))
 
     inside = around_the_mirror(method.white_radius * np.linspace(0.0, 0.999, 8), 24)
-    factor = brdf.direction_factor(ELAPHE.material, trapezoid(ELAPHE.spectrum, 1.0), *inside)[:, None]
+    factor = brdf.direction_factor(ELAPHE.material, trapezoid(ELAPHE.light, 1.0), *inside)[:, None]
     np.testing.assert_allclose(method.xyz(*inside), factor * white, rtol=1e-12)
-    exact = Reference(field, SIGMA, 380.0).xyz(ELAPHE.spectrum, ELAPHE.material, *inside, step_nm=5.0)
+    exact = Reference(field, SIGMA, 380.0).xyz(ELAPHE.light, ELAPHE.material, *inside, step_nm=5.0)
     assert np.all(exact[:, 1] < 0.5)
 
     outside = around_the_mirror(np.linspace(1.001 * method.white_radius, 0.98, 60), 24)
@@ -111,7 +111,7 @@ def test_orders_of_a_grating_keep_their_colour() -> None:
     u = np.linspace(0.2, 0.38, 40)
     wr = np.stack([u, np.zeros_like(u), np.sqrt(1 - u**2)], axis=-1)
     wi = np.broadcast_to([0.0, 0.0, 1.0], wr.shape)
-    exact = Reference(field, SIGMA, 380.0).xyz(of.spectrum, of.material, wi, wr)
+    exact = Reference(field, SIGMA, 380.0).xyz(of.light, of.material, wi, wr)
     found = Nmm(field, of).xyz(wi, wr)
     # a lobe exp(-d^2 / (sigma_f X)^2) is summed at whole d: 1 + 2 exp(-(pi sigma_f X)^2) = 1.037 of it, by Poisson
     lobe = field.size_um[0] * sigma_f(SIGMA)

@@ -3,25 +3,30 @@
 import numpy as np
 import pytest
 
-from pipeline.config import models as config
-from pipeline.config.models import Config, Material, PolarLayout
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import power_direct, xyz_direct
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.exact import Exact
 from pipeline.evaluation.methods.method import Method, Monochromatic, prepare
 from pipeline.evaluation.methods.polar_table import PolarTableMethod
 from pipeline.optics import geometry
+from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import Light
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Map, relative_unit
+from pipeline.surface.recipes.parameters import Mirror
+from pipeline.surface.source import SurfaceSource
+from pipeline.tables.evaluate import Map
+from pipeline.tables.polar.layout import PolarLayout
 
 SIGMA_UM = 2.5
 
 
 def config_of(**sections: object) -> Config:
-    surface = config.Surface(recipe=config.Mirror(kind="mirror"))
-    return Config(name="test", surface=surface, coherence=config.Coherence(sigma_um=SIGMA_UM), **sections)
+    surface = SurfaceSource(recipe=Mirror(kind="mirror"))
+    return Config(name="test", surface=surface, coherence=Coherence(sigma_um=SIGMA_UM), **sections)
 
 
 def rough(pitch: float = 0.09) -> HeightField:
@@ -40,13 +45,13 @@ def table() -> PolarTableMethod:
 
 
 def test_exact_is_the_plain_sum_over_samples() -> None:
-    settings = config_of(material=Material(fresnel="conductor"), spectrum=config.Spectrum(range_nm=(500.0, 520.0)))
+    settings = config_of(material=Material(fresnel="conductor"), spectrum=Light(range_nm=(500.0, 520.0)))
     method, (wi, wr) = Exact(rough(), settings), pairs(3)
     uvw = geometry.uvw(wi, wr)
     np.testing.assert_allclose(
         method.power(uvw, np.array([500.0, 515.0]))[:, 1], power_direct(rough(), SIGMA_UM, uvw, 515.0), atol=1e-9
     )
-    expected = xyz_direct(rough(), SIGMA_UM, settings.spectrum, settings.material, wi, wr)
+    expected = xyz_direct(rough(), SIGMA_UM, settings.light, settings.material, wi, wr)
     np.testing.assert_allclose(method.xyz(wi, wr), expected, rtol=1e-6)
 
 
@@ -65,7 +70,7 @@ def test_the_table_keeps_its_budget(fresnel: str) -> None:
     settings = config_of(material=Material(fresnel=fresnel))
     table, wr = PolarTableMethod(rough(), settings), Map(41, 0.98).views()
     wi = np.broadcast_to(geometry.direction(0.3, 0.4), wr.shape)
-    unit = relative_unit(settings)
+    unit = settings.radiometry.unit
     error = delta_e(table.xyz(wi, wr) / unit, Exact(rough(), settings).xyz(wi, wr) / unit, 7500.0)
     assert 0.0 < float(np.mean(error)) < 0.2
 

@@ -3,26 +3,29 @@
 import numpy as np
 import pytest
 
-from pipeline.config import models as config
-from pipeline.config.models import Config, Material, Spectrum
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.evaluation.methods.paper_look_up import PaperLookUp
 from pipeline.evaluation.methods.paper_reference import PaperReference
 from pipeline.optics import geometry
-from pipeline.optics.coherence import sigma_f
+from pipeline.optics.coherence import Coherence, sigma_f
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import Light
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
+from pipeline.surface.recipes.parameters import Blazed, Mirror
+from pipeline.surface.source import SurfaceSource
 from pipeline.tables.taylor import grid
 
 SIGMA_UM = 2.5
 
 
 def config_of(**sections: object) -> Config:
-    surface = config.Surface(recipe=config.Mirror(kind="mirror"))
-    return Config(name="test", surface=surface, coherence=config.Coherence(sigma_um=SIGMA_UM), **sections)
+    surface = SurfaceSource(recipe=Mirror(kind="mirror"))
+    return Config(name="test", surface=surface, coherence=Coherence(sigma_um=SIGMA_UM), **sections)
 
 
 def rough(height: float = 0.1, pitch: float = 0.09) -> HeightField:
@@ -63,15 +66,15 @@ def test_its_colours_are_the_exact_ones_at_its_step() -> None:
     wi, wr = pairs(40)
     for material in (Material(), Material(fresnel="conductor")):
         settings = config_of(material=material)
-        exact = Reference(rough(), SIGMA_UM, 380.0).xyz(settings.spectrum, material, wi, wr, step_nm=5.0)
+        exact = Reference(rough(), SIGMA_UM, 380.0).xyz(settings.light, material, wi, wr, step_nm=5.0)
         found = PaperReference(rough(), settings).xyz(wi, wr)
         np.testing.assert_allclose(found, exact, rtol=2e-3)
 
 
 def test_blazed_light_leaves_where_the_grating_equation_says() -> None:
     """[D14] eq. 13 at 75 degrees: sin(theta) = sin(phi) + m lambda / a, the first order of 2.5 um."""
-    grating = make(config.Blazed(kind="blazed", size_um=(40.0, 10.0)))
-    settings = config_of().model_copy(update={"coherence": config.Coherence(sigma_um=10.0)})
+    grating = make(Blazed(kind="blazed", size_um=(40.0, 10.0)))
+    settings = config_of().model_copy(update={"coherence": Coherence(sigma_um=10.0)})
     shader = PaperReference(grating, settings)
     nm = np.array([420.0, 550.0, 690.0])
     phi = np.radians(np.linspace(30.0, 60.0, 3001))
@@ -115,4 +118,4 @@ def test_only_the_reference_shader_knows_single_wavelengths(reference_shader: Pa
 @pytest.mark.parametrize("maker", [PaperReference, PaperLookUp])
 def test_heights_beyond_taylor_are_refused(maker: type) -> None:
     with pytest.raises(AccuracyError, match="Taylor tables of order"):
-        maker(rough(height=0.8), config_of(spectrum=Spectrum(range_nm=(500.0, 600.0))))
+        maker(rough(height=0.8), config_of(spectrum=Light(range_nm=(500.0, 600.0))))

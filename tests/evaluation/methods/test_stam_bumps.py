@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.config import models as config
-from pipeline.config.models import Config, LaserLine, Spectrum
+from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import ConfigError
 from pipeline.evaluation.methods.method import Monochromatic, integrated
@@ -17,17 +16,21 @@ from pipeline.evaluation.methods.stam_bumps import (
     matched_epsilon,
 )
 from pipeline.optics import geometry
+from pipeline.optics.coherence import Coherence
 from pipeline.optics.geometry import Array
+from pipeline.optics.light import LaserLine, Light
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
+from pipeline.surface.recipes.parameters import Blazed, Elaphe, Mirror
+from pipeline.surface.source import SurfaceSource
 
 PERIOD_X, PERIOD_Y = 2.0, 1.6
 BUMPS = [RectangularBump(0.13, 0.5, 0.25), TriangularBump(0.31, 0.5, 0.25)]
 
 
 def config_of(sigma_um: float, **sections: object) -> Config:
-    surface = config.Surface(recipe=config.Mirror(kind="mirror"))
-    coherence = config.Coherence(sigma_um=sigma_um)
+    surface = SurfaceSource(recipe=Mirror(kind="mirror"))
+    coherence = Coherence(sigma_um=sigma_um)
     return Config(name="test", surface=surface, coherence=coherence, **sections)
 
 
@@ -107,13 +110,13 @@ def test_colours_of_an_order_are_the_exact_ones(u: tuple[float, float], v: tuple
     wi, wr = neighbourhood(u, v)
     found = StamBumps(tiled(bump, repeats), settings, (PERIOD_X, PERIOD_Y), bump, epsilon).xyz(wi, wr)
     reference = Reference(tiled(bump, repeats), sigma, 380.0)
-    exact = reference.xyz(settings.spectrum, settings.material, wi, wr, step_nm=4.0)
+    exact = reference.xyz(settings.light, settings.material, wi, wr, step_nm=4.0)
     np.testing.assert_allclose(found.mean(axis=0), exact.mean(axis=0), rtol=0.03)
 
 
 def test_picked_wavelengths_are_the_bound_integrated() -> None:
     """The delta's colour is that of the bound on both axes, integrated at 1 nm, over a neighbourhood."""
-    bump, settings = BUMPS[1], config_of(2.0, spectrum=Spectrum(range_nm=(450.0, 650.0)))
+    bump, settings = BUMPS[1], config_of(2.0, spectrum=Light(range_nm=(450.0, 650.0)))
     method = StamBumps(tiled(bump, 1), settings, (PERIOD_X, PERIOD_Y), bump, 0.03)
     wi, wr = neighbourhood((0.15, 0.7), (0.2, 0.65))
     bounded = integrated(method.power, settings, wi, wr, step_nm=1.0)
@@ -136,7 +139,7 @@ def test_a_wider_bound_fills_the_bands_along_both_axes() -> None:
 
 def test_a_laser_is_seen_where_both_orders_are_near() -> None:
     """One wavelength: nothing to pick, so the bound alone."""
-    settings = config_of(2.0, spectrum=Spectrum(illuminant=LaserLine(lambda_nm=532.0)))
+    settings = config_of(2.0, spectrum=Light(illuminant=LaserLine(lambda_nm=532.0)))
     method = StamBumps(tiled(BUMPS[0], 1), settings, (PERIOD_X, PERIOD_Y), BUMPS[0])
     on, off = 0.532 / PERIOD_X, 0.532 / PERIOD_X * 1.02
     wr = np.array([[-u, 0.0, np.sqrt(1.0 - u**2)] for u in (on, off)])
@@ -160,11 +163,11 @@ def test_periods_are_the_surfaces_own() -> None:
     dx, dy = estimated_periods(tiled(RectangularBump(0.1), 8), 5.0)
     assert dx == pytest.approx(PERIOD_X, rel=1e-3)
     assert dy == pytest.approx(PERIOD_Y, rel=1e-3)
-    elaphe = make(config.Elaphe(kind="elaphe", size_um=30.0))
+    elaphe = make(Elaphe(kind="elaphe", size_um=30.0))
     dx, dy = estimated_periods(elaphe, 5.0)
     assert dx == pytest.approx(1.144, rel=0.03)
     assert 1.5 < dy < 6.0
-    grating = make(config.Blazed(kind="blazed", size_um=40.0))
+    grating = make(Blazed(kind="blazed", size_um=40.0))
     assert estimated_periods(grating, 5.0) == pytest.approx((2.5, grating.size_um[1]), rel=2e-3)
 
 

@@ -5,7 +5,6 @@ from math import factorial
 import numpy as np
 import pytest
 
-from pipeline.config import models as config
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import power_direct
 from pipeline.evaluation.methods.method import Monochromatic
@@ -17,9 +16,12 @@ from pipeline.evaluation.methods.stam_gaussian import (
     autocovariance,
 )
 from pipeline.optics import geometry
-from pipeline.optics.coherence import folded_window, sigma_f
+from pipeline.optics.coherence import Coherence, folded_window, sigma_f
 from pipeline.optics.geometry import Array
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.recipes.parameters import Mirror
+from pipeline.surface.source import SurfaceSource
 
 LAMBDA_NM = 500.0
 
@@ -31,8 +33,8 @@ def pairs(count: int, seed: int = 0) -> tuple[Array, Array]:
 
 
 def config_of(sigma_um: float, **sections: object) -> Config:
-    surface = config.Surface(recipe=config.Mirror(kind="mirror"))
-    coherence = config.Coherence(sigma_um=sigma_um)
+    surface = SurfaceSource(recipe=Mirror(kind="mirror"))
+    coherence = Coherence(sigma_um=sigma_um)
     return Config(name="test", surface=surface, coherence=coherence, **sections)
 
 
@@ -181,7 +183,7 @@ def test_low_heights_scatter_their_own_spectrum() -> None:
 
 
 def test_exchanging_light_and_view_changes_nothing_but_the_cosine() -> None:
-    method = StamGaussian(rough(64, 64, (0.1, 0.1)), config_of(1.5, material=config.Material(fresnel="conductor")))
+    method = StamGaussian(rough(64, 64, (0.1, 0.1)), config_of(1.5, material=Material(fresnel="conductor")))
     wi, wr = pairs(20)
     there, back = method.xyz(wi, wr) / wi[:, 2:], method.xyz(wr, wi) / wr[:, 2:]
     np.testing.assert_allclose(there, back, rtol=1e-11)

@@ -1,4 +1,4 @@
-"""Spectrum: height field -> the polar power spectrum E(r, phi, s), which knows no illuminant and no observer."""
+"""Power spectrum: height field -> E(r, phi, s) on a polar grid, which knows no illuminant and no observer."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import device
-from pipeline.config.models import Config, LaserLine, PolarLayout
-from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.config.models import Config
+from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
@@ -19,14 +19,15 @@ from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.surface import windows
 from pipeline.tables.planning import plan
+from pipeline.tables.polar.layout import PolarLayout
 
-_FILE = "spectrum.zarr"
-# from the stack to tables of a spectrum: the plan measures with them
+_FILE = "power_spectrum.zarr"
+# from the stack to tables of a power spectrum: the plan measures with them
 PLANNING_KERNELS = ("dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl")
 # By its key, the power spectrum that this process made last: table and validation take longer to read it back than to
 # use it. A large one serves the table alone, and then leaves its memory to the reference.
 _KEPT_BYTES = 2**28
-_just_made: dict[str, spectrum.PolarSpectrum] = {}
+_just_made: dict[str, power_spectrum.PolarPowerSpectrum] = {}
 
 
 def layout_of(config: Config) -> PolarLayout:
@@ -48,10 +49,10 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _wavelengths(config: Config) -> dict[str, Any]:
-    """A line or a range: all that a spectrum has to do with light."""
-    light = config.spectrum
-    if isinstance(light.illuminant, LaserLine):
-        return light.illuminant.model_dump()
+    """A line or a range: all of the light that a power spectrum depends on."""
+    light = config.light
+    if light.is_line:
+        return {"lambda_nm": light.lambda_min_nm}
     return {"range_nm": list(light.range_nm)}
 
 
@@ -62,7 +63,7 @@ def budget(config: Config) -> plan.Budget:
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     fields = windows.places(surface.load(inputs["surface"]), config.coherence)
-    light = config.spectrum
+    light = config.light
     built, chosen = plan.make(
         fields, config.coherence.sigma_um, light, config.scene, budget(config), layout_of(config), progress
     )
@@ -84,25 +85,25 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         },
     )
     _just_made.clear()
-    _just_made[SPECTRUM.key(config, {"surface": inputs["surface"].key})] = built
+    _just_made[POWER_SPECTRUM.key(config, {"surface": inputs["surface"].key})] = built
     return {
         **asdict(chosen),
         "radii": len(built.radius_per_um),
         "bytes": built.values.nbytes,
         "windows": len(fields),
-        "speckle_contrast": spectrum.speckle_contrast(built),
+        "speckle_contrast": power_spectrum.speckle_contrast(built),
     }
 
 
 def planned(artifact: Artifact) -> plan.Plan:
-    """The plan that a spectrum artifact was made by."""
+    """The plan of a power spectrum artifact."""
     found = {key: artifact.summary[key] for key in ("terms", "s_nodes", "w_terms", "probed_delta_e")}
     azimuths, rings = Azimuths(**artifact.summary["azimuths"]), Rings(**artifact.summary["rings"])
     return plan.Plan(azimuths=azimuths, rings=rings, **found)
 
 
-def load(artifact: Artifact) -> spectrum.PolarSpectrum:
-    """The power spectrum of a spectrum artifact, from memory where this process has just made it."""
+def load(artifact: Artifact) -> power_spectrum.PolarPowerSpectrum:
+    """The power spectrum of an artifact, from memory where this process has just made it."""
     made = _just_made.get(artifact.key)
     if made is not None:
         if made.values.nbytes > _KEPT_BYTES:
@@ -110,7 +111,7 @@ def load(artifact: Artifact) -> spectrum.PolarSpectrum:
         return made
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
-    return spectrum.PolarSpectrum(
+    return power_spectrum.PolarPowerSpectrum(
         _on_a_cache_line(arrays.load(zarr, "E")),
         arrays.load(zarr, "r"),
         Azimuths(**found["azimuths"]),
@@ -127,4 +128,4 @@ def _on_a_cache_line(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return placed
 
 
-SPECTRUM = Stage("spectrum", 4, ("surface",), _parameters, _produce)
+POWER_SPECTRUM = Stage("power_spectrum", 4, ("surface",), _parameters, _produce)

@@ -1,0 +1,102 @@
+"""The numbers of every synthetic surface, as a config gives them: one class a recipe."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.validated import Positive, PositivePair, Validated
+
+Seed = Annotated[int, Field(ge=0)]
+
+
+class RecipeBase(Validated):
+    """What every synthetic surface has. `size_um` is rounded to a whole number of periods."""
+
+    size_um: Positive | PositivePair = 65.0
+    # 1 / (2 pitch) covers 2 / 380 nm, the highest frequency that visible light reaches
+    pitch_um: Positive | PositivePair = 0.09
+
+
+class Mirror(RecipeBase):
+    kind: Literal["mirror"]
+
+
+class TiltedMirror(RecipeBase):
+    """A plane rising along x and y by the given angles."""
+
+    kind: Literal["tilted_mirror"]
+    tilt_x_deg: Annotated[float, Field(gt=-80, lt=80)] = 2.0
+    tilt_y_deg: Annotated[float, Field(gt=-80, lt=80)] = 0.0
+
+
+class Sinusoid(RecipeBase):
+    """h = amplitude cos(2 pi x / period)."""
+
+    kind: Literal["sinusoid"]
+    period_um: Positive = 2.5
+    amplitude_um: Positive = 0.1
+    axis: Literal["x", "y"] = "x"
+
+
+class Rectangular(RecipeBase):
+    """Height `height_um` over the share `duty` of each period, else 0."""
+
+    kind: Literal["rectangular"]
+    period_um: Positive = 2.5
+    height_um: Positive = 0.15
+    duty: Annotated[float, Field(gt=0, lt=1)] = 0.5
+    axis: Literal["x", "y"] = "x"
+
+
+class Blazed(RecipeBase):
+    """A sawtooth rising along the axis from 0 to `height_um` in each period."""
+
+    kind: Literal["blazed"]
+    period_um: Positive = 2.5
+    height_um: Positive = 0.25
+    axis: Literal["x", "y"] = "x"
+
+
+class CompactDisc(RecipeBase):
+    """Tracks along x, `track_um` apart; pits and lands of 3 to 11 channel bits at random."""
+
+    kind: Literal["cd"]
+    track_um: Positive = 1.6
+    bit_um: Positive = 0.2777
+    pit_width_um: Positive = 0.5
+    depth_um: Positive = 0.12
+    seed: Seed = 1
+
+
+class GaussianRandom(RecipeBase):
+    """A Gaussian random surface of rms `sigma_h_um` and autocorrelation exp(-x^2/lx^2 - y^2/ly^2)."""
+
+    kind: Literal["gaussian"]
+    sigma_h_um: Positive = 0.05
+    correlation_um: Positive | PositivePair = 1.0
+    seed: Seed = 1
+
+
+class Elaphe(RecipeBase):
+    """Overlapping fingers along y, `across_um` apart, without a firm period along their length."""
+
+    kind: Literal["elaphe"]
+    across_um: Positive = 1.144
+    height_um: Positive = 0.37
+    seed: Seed = 1
+
+
+class Xenopeltis(RecipeBase):
+    """Rows of fingers: `across_um` apart along x, `along_um` along y, the rows wandering."""
+
+    kind: Literal["xenopeltis"]
+    across_um: Positive = 0.55
+    along_um: Positive = 1.55
+    height_um: Positive = 0.3
+    seed: Seed = 1
+
+
+Recipe = Annotated[
+    Mirror | TiltedMirror | Sinusoid | Rectangular | Blazed | CompactDisc | GaussianRandom | Elaphe | Xenopeltis,
+    Field(discriminator="kind"),
+]

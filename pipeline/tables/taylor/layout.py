@@ -1,0 +1,35 @@
+"""The settings of the paper's table."""
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, field_validator
+
+from pipeline.diffraction.expansion import LARGEST_TOLERANCE
+from pipeline.validated import Validated
+
+
+class TaylorLayout(Validated):
+    """The paper's table: I_p on `resolution` x `resolution` nodes 2 |t|^power sign(t)."""
+
+    averages_windows: ClassVar[bool] = False
+    holds_metals: ClassVar[bool] = False
+    compresses: ClassVar[bool] = False
+
+    layout: Literal["taylor"]
+    resolution: Annotated[int, Field(ge=3, le=4001)] = 501
+    power: Annotated[float, Field(ge=1, le=9)] = 5.0
+    terms: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = "auto"
+    step_nm: Annotated[float, Field(ge=0.1, le=50)] = 5.0
+    tolerance: Annotated[float, Field(ge=1e-7, le=LARGEST_TOLERANCE)] = 1e-4
+
+    @field_validator("resolution")
+    @classmethod
+    def odd(cls, value: int) -> int:
+        if value % 2 == 0:
+            raise ValueError(f"expected an odd number, so that (u, v) = (0, 0) is a node, got {value}")
+        return value
+
+    @property
+    def mean_step_nm(self) -> float:
+        """Step, nm, of the means over wavelength that are taken outside the spectral integral: the integral's own."""
+        return self.step_nm
