@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.accuracy.checks import MAP_RADIUS
 from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack
-from pipeline.diffraction.polar_grid import TILE
+from pipeline.diffraction.polar_grid import TILE, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import STEP_NM, MeanReference
 from pipeline.optics import brdf, geometry
@@ -18,7 +18,8 @@ from pipeline.optics.light import trapezoid
 from pipeline.tables.evaluate import Evaluator, Map, table_evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.polar import quadrature
-from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.bake import PolarBake
+from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.quadrature import RingQuadratures
 from pipeline.tables.taylor import table as taylor
 from pipeline.tables.taylor.layout import TaylorLayout
@@ -118,11 +119,20 @@ class TaylorStudy:
 class PolarStudy:
     """Rings, azimuths, terms in |w| and wavelength step of the polar table, everything else as planned."""
 
-    def __init__(self, power: PolarPowerSpectrum, planned: plan.Plan, chosen: Evaluator, views: CoarseMap) -> None:
+    def __init__(
+        self,
+        power: PolarPowerSpectrum,
+        planned: plan.Plan,
+        layout: PolarLayout,
+        chosen: Evaluator,
+        views: CoarseMap,
+    ) -> None:
         self._power, self._plan, self._views = power, planned, views
-        self._config = views.config
+        config = self._config = views.config
+        allowed = plan.Budget(config.budget_delta_e, config.accuracy.exposure_ru)
+        self._bake = planned.bake(config.radiometry, allowed, layout)
         self._chosen = views.error(chosen)
-        self._rules = self._rules_of(planned.rings.rho())
+        self._rules = self._bake.rules(planned.rings.rho())
 
     def curves(self, has_steps: bool) -> Study:
         """Every setting; a laser line has no wavelength step to vary."""
@@ -139,7 +149,7 @@ class PolarStudy:
         """Mean error against the number of azimuths: every eighth, fourth, second and all."""
         chosen = self._plan.azimuths.count
         skips = [skip for skip in (8, 4, 2) if chosen % (skip * TILE) == 0]
-        errors = [self._error(self._plan, self._rules, self._power.thinned(skip)) for skip in skips]
+        errors = [self._error(self._bake, self._rules, self._power.thinned(skip)) for skip in skips]
         counts = [float(chosen // skip) for skip in (*skips, 1)]
         return Curve("azimuths", "", counts, [*errors, self._chosen], float(chosen))
 
@@ -155,23 +165,20 @@ class PolarStudy:
         light, rho = self._config.light, self._plan.rings.rho()
         steps = [1.0, 2.0, 5.0, 10.0, 20.0]
         light_of = self._config.radiometry.illumination
-        errors = [self._error(self._plan, quadrature.uniform(light_of(s), len(rho))) for s in steps]
+        errors = [self._error(self._bake, quadrature.uniform(light_of(s), len(rho)), self._power) for s in steps]
         low, high = light.range_nm
         chosen = (high - low) / (float(np.mean(self._rules.count)) - 1.0)
         return Curve("wavelength step", "nm", steps, errors, round(chosen, 2))
 
     def _of_rings(self, count: int) -> float:
         rings = replace(self._plan.rings, count=count)
-        return self._error(replace(self._plan, rings=rings), self._rules_of(rings.rho()))
+        return self._error_on(rings, self._bake, self._bake.rules(rings.rho()), self._power)
 
     def _of_w_terms(self, count: int) -> float:
-        return self._error(replace(self._plan, w_terms=count), self._rules)
+        return self._error(replace(self._bake, w_terms=count), self._rules, self._power)
 
-    def _rules_of(self, rho: Array) -> RingQuadratures:
-        tolerance = plan.Budget(self._config.budget_delta_e, self._config.accuracy.exposure_ru).quadrature
-        return quadrature.choose(self._config.radiometry.illumination, rho, self._power.sigma_um, tolerance)
+    def _error(self, bake: PolarBake, rules: RingQuadratures, power: PolarPowerSpectrum) -> float:
+        return self._error_on(self._plan.rings, bake, rules, power)
 
-    def _error(self, planned: plan.Plan, rules: RingQuadratures, power: PolarPowerSpectrum | None = None) -> float:
-        reflectance = self._config.radiometry.reflectance
-        table = polar.build(power or self._power, planned.rings, rules, planned.w_terms, reflectance)
-        return self._views.error(table_evaluator(table, self._config.radiometry))
+    def _error_on(self, rings: Rings, bake: PolarBake, rules: RingQuadratures, power: PolarPowerSpectrum) -> float:
+        return self._views.error(table_evaluator(bake.table(power, rings, rules), self._config.radiometry))

@@ -17,7 +17,6 @@ from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, mate
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import table_evaluator
-from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
 
 _FILE = "table.zarr"
@@ -36,13 +35,12 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     power = power_spectrum.load(inputs["power_spectrum"])
     plan = power_spectrum.planned(inputs["power_spectrum"])
-    light = config.radiometry.illumination
-    budget = power_spectrum.budget(config)
-    rules = quadrature.choose(light, plan.rings.rho(), config.coherence.sigma_um, budget.quadrature)
-    reflectance = config.radiometry.reflectance
-    table = polar.build(power, plan.rings, rules, plan.w_terms, reflectance)
+    bake = plan.bake(config.radiometry, power_spectrum.budget(config), power_spectrum.layout_of(config))
+    rules = bake.rules(plan.rings.rho())
+    table = bake.table(power, plan.rings, rules)
     progress("table", 1.0)
-    unknown = polar.unknown_share(table.grid, power.band_per_um, light(config.table.mean_step_nm))
+    light = config.radiometry.illumination(config.table.mean_step_nm)
+    unknown = polar.unknown_share(table.grid, power.band_per_um, light)
     field = surface.load(inputs["surface"])
     reference = reference_of(field, config)
     certified = certificate.certify(table_evaluator(table, config.radiometry), reference, config, progress)

@@ -63,10 +63,10 @@ def budget(config: Config) -> plan.Budget:
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     fields = windows.places(surface.load(inputs["surface"]), config.coherence)
-    light = config.light
-    built, chosen = plan.make(
-        fields, config.coherence.sigma_um, light, config.scene, budget(config), layout_of(config), progress
-    )
+    layout, allowed = layout_of(config), budget(config)
+    trial = plan.start(fields, config.coherence.sigma_um, config.light, config.scene, allowed, layout, progress)
+    chosen = plan.choose(trial, config.scene, allowed, layout)
+    built = trial.mean_power_spectrum(chosen.azimuths, fields[1:], progress)
     arrays.save(
         folder / _FILE,
         {

@@ -102,8 +102,8 @@ def _study(
     """What there is to vary in a config's layout."""
     if isinstance(config.table, TaylorLayout):
         return convergence.TaylorStudy(stack.load(inputs["stack"]), config.table, evaluate, coarse)
-    power = inputs["power_spectrum"]
-    return convergence.PolarStudy(power_spectrum.load(power), power_spectrum.planned(power), evaluate, coarse)
+    power, layout = inputs["power_spectrum"], power_spectrum.layout_of(config)
+    return convergence.PolarStudy(power_spectrum.load(power), power_spectrum.planned(power), layout, evaluate, coarse)
 
 
 def _curves(study: convergence.Study, progress: Progress) -> list[convergence.Curve]:

@@ -18,7 +18,6 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.planning import anisotropy as scattering
 from pipeline.tables.planning import plan
-from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
 
 pytestmark = pytest.mark.slow
@@ -43,13 +42,12 @@ def exact_of(found: Config) -> MeanReference:
 def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
     budget = plan.Budget(found.budget_delta_e, found.accuracy.exposure_ru)
     sigma = found.coherence.sigma_um
-    power, chosen = plan.make(
-        windows.places(field_of(found), found.coherence), sigma, found.light, found.scene, budget, found.table
-    )
-
-    rules = quadrature.choose(found.radiometry.illumination, chosen.rings.rho(), sigma, budget.quadrature)
-    reflectance = found.radiometry.reflectance
-    return polar.build(power, chosen.rings, rules, chosen.w_terms, reflectance), chosen
+    fields = windows.places(field_of(found), found.coherence)
+    trial = plan.start(fields, sigma, found.light, found.scene, budget, found.table)
+    chosen = plan.choose(trial, found.scene, budget, found.table)
+    power = trial.mean_power_spectrum(chosen.azimuths, fields[1:])
+    bake = chosen.bake(found.radiometry, budget, found.table)
+    return bake.table(power, chosen.rings, bake.rules(chosen.rings.rho())), chosen
 
 
 @pytest.mark.parametrize("delta_e", [1.0, 0.1])

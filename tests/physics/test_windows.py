@@ -43,18 +43,14 @@ def test_each_place_is_in_the_middle_and_reaches_over_no_edge() -> None:
 
 def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
     field = rough(150, 150)
-    layout = PolarLayout(rings=20, azimuths=256)
-    many, one = (
-        plan.make(
-            windows.places(field, Coherence(sigma_um=SIGMA, windows=kind)),
-            SIGMA,
-            Light(),
-            None,
-            plan.Budget(0.5, 7500.0),
-            layout,
-        )[0]
-        for kind in ("auto", "centre")
-    )
+    layout, budget = PolarLayout(rings=20, azimuths=256), plan.Budget(0.5, 7500.0)
+
+    def mean(kind):
+        fields = windows.places(field, Coherence(sigma_um=SIGMA, windows=kind))
+        trial = plan.start(fields, SIGMA, Light(), None, budget, layout)
+        return trial.mean_power_spectrum(plan.choose(trial, None, budget, layout).azimuths, fields[1:])
+
+    many, one = mean("auto"), mean("centre")
     r, phi = many.radius_per_um[40], many.azimuths.angles()[5]
     uvw = np.array([[r * np.cos(phi), r * np.sin(phi), -many.s_per_um[3] / (2.0 * np.pi)]])
     places = windows.places(field, Coherence(sigma_um=SIGMA))

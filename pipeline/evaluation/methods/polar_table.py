@@ -13,11 +13,9 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.planning.plan import Budget, Plan
-from pipeline.tables.polar import quadrature, spectral
-from pipeline.tables.polar import table as polar
+from pipeline.tables.polar import spectral
 from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.spectral import SpectralTable
-from pipeline.tables.polar.table import PolarTable
 
 
 class PolarTableMethod:
@@ -33,7 +31,9 @@ class PolarTableMethod:
         """Raises AccuracyError where the budget is out of reach; DeviceError where no device works."""
         self._field, self._config = crop_to_window(field, config.coherence.sigma_um).centred(), config
         self._layout = config.table if isinstance(config.table, PolarLayout) else PolarLayout()
-        self._table = self._integrated(*self._planned(self._layout))
+        power, chosen = self._planned(self._layout)
+        bake = chosen.bake(config.radiometry, self._budget, self._layout)
+        self._table = bake.table(power, chosen.rings, bake.rules(chosen.rings.rho()))
         self._look_up = table_evaluator(self._table, config.radiometry)
 
     @property
@@ -67,11 +67,6 @@ class PolarTableMethod:
 
     def _planned(self, layout: PolarLayout) -> tuple[PolarPowerSpectrum, Plan]:
         config = self._config
-        return plan.make([self._field], config.coherence.sigma_um, config.light, config.scene, self._budget, layout)
-
-    def _integrated(self, made: PolarPowerSpectrum, chosen: Plan) -> PolarTable:
-        config, rho = self._config, chosen.rings.rho()
-        light, sigma_um = config.radiometry.illumination, config.coherence.sigma_um
-        rules = quadrature.choose(light, rho, sigma_um, self._budget.quadrature)
-        reflectance = config.radiometry.reflectance
-        return polar.build(made, chosen.rings, rules, chosen.w_terms, reflectance)
+        trial = plan.start([self._field], config.coherence.sigma_um, config.light, config.scene, self._budget, layout)
+        chosen = plan.choose(trial, config.scene, self._budget, layout)
+        return trial.power_spectrum(chosen.azimuths), chosen

@@ -31,7 +31,7 @@ class Stages:
 
 
 @dataclass(frozen=True)
-class PolarBake:
+class TimedBake:
     """What was made, the times of the fastest bake, and every kernel's best.
 
     second_light_s: wavelengths and table of the same spectrum under another illuminant; None for a laser line.
@@ -46,17 +46,17 @@ class PolarBake:
     kernel_s: dict[str, float]
 
 
-def bake(setting: Setting, repeats: int) -> PolarBake:
+def bake(setting: Setting, repeats: int) -> TimedBake:
     """Bakes a table several times over; the kernels must have been compiled."""
     setting.table(setting.power_spectrum(setting.stack()), setting.light)
     with device.timing() as launches:
         runs = [_once(setting) for _ in range(repeats)]
     built, made, table, _ = runs[-1]
     best = min((stages for *_, stages in runs), key=lambda stages: stages.total)
-    return PolarBake(built, made, table, best, _second_light(setting, made, repeats), _fastest(launches))
+    return TimedBake(built, made, table, best, _second_light(setting, made, repeats), _fastest(launches))
 
 
-def best(first: PolarBake, again: PolarBake) -> PolarBake:
+def best(first: TimedBake, again: TimedBake) -> TimedBake:
     """The better times of two bakes of one setting: what else a machine does comes in bursts of seconds."""
     lights = [bake.second_light_s for bake in (first, again) if bake.second_light_s is not None]
     return replace(
@@ -88,7 +88,7 @@ def _fastest(launches: Iterable[Launch]) -> dict[str, float]:
     return dict(seconds)
 
 
-def stages(setting: Setting, baked: PolarBake) -> list[Timed]:
+def stages(setting: Setting, baked: TimedBake) -> list[Timed]:
     """What each stage needs and how long it took; of kernels, their best run."""
     seconds = baked.kernel_s
     spline_s = seconds["filter_azimuths"] + seconds["filter_rings"]

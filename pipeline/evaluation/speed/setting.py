@@ -1,6 +1,6 @@
 """A polar table to be timed: everything that its stages are given, and the same table's integral in other hands."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 
@@ -19,8 +19,9 @@ from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.planning import plan
 from pipeline.tables.planning.plan import Budget, Plan
-from pipeline.tables.polar import line_points, quadrature, spectral_integral
+from pipeline.tables.polar import line_points, spectral_integral
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 
 # what the terms, nodes and wavelengths of every polar table here are chosen for; its grid is given
@@ -57,29 +58,28 @@ class Setting:
         return self.plan.rings.rho_max / (1e-3 * self.lambda_min_nm)
 
     @cached_property
+    def bake(self) -> PolarBake:
+        """The bake of this plan under the config's own light."""
+        return self.plan.bake(self._under(self.light), BUDGET, PolarLayout())
+
+    def _under(self, light: Light) -> Radiometry:
+        return Radiometry(light, self.config.material, self.sigma_um)
+
+    @property
     def radius_per_um(self) -> Array:
         """The radii of E."""
-        line = self.light.is_line
-        spacing = power_spectrum.SPACING_OF_A_LINE if line else power_spectrum.SPACING
-        return power_spectrum.radii(self.sigma_um, self.r_max_per_um, spacing)
+        return self.bake.radius_per_um
 
     def stack(self) -> Stack:
-        reach = float(self.radius_per_um[-1])
-        return power_spectrum.chebyshev_stack(self.field, self.sigma_um, reach, self.plan.terms, AMPLITUDE)
+        return self.bake.stack(self.field)
 
     def power_spectrum(self, built: Stack) -> PolarPowerSpectrum:
-        return power_spectrum.build(
-            built, self.plan.azimuths, self.radius_per_um, self.lambda_min_nm, self.plan.s_nodes
-        )
+        return self.bake.power_spectrum(built, self.plan.azimuths)
 
     @cached_property
     def rules(self) -> RingQuadratures:
         """The wavelengths of every ring under the config's own light."""
-        return self.rules_of(self.light)
-
-    def rules_of(self, light: Light) -> RingQuadratures:
-        lit = Radiometry(light, self.config.material, self.sigma_um).illumination
-        return quadrature.choose(lit, self.plan.rings.rho(), self.sigma_um, BUDGET.quadrature)
+        return self.bake.rules(self.plan.rings.rho())
 
     @cached_property
     def points(self) -> LinePoints:
@@ -88,13 +88,14 @@ class Setting:
         return line_points.choose(self.radius_per_um, self.plan.s_nodes, s_max, rho, self.rules)
 
     def table(self, made: PolarPowerSpectrum, light: Light) -> polar.PolarTable:
-        reflectance = Radiometry(light, self.config.material, self.sigma_um).reflectance
-        return polar.build(made, self.plan.rings, self.rules_of(light), self.plan.w_terms, reflectance)
+        """Wavelengths and table under a light of the same range."""
+        bake = replace(self.bake, radiometry=self._under(light))
+        return bake.table(made, self.plan.rings, bake.rules(self.plan.rings.rho()))
 
     def samples(self, made: PolarPowerSpectrum) -> NDArray[np.float64]:
         """The table's samples (rings, 3, w nodes, azimuths) before splines are put through them."""
         of = made.values, made.radius_per_um, made.s_max_per_um, self.plan.rings.rho(), self.rules
-        reflectance = Radiometry(self.light, self.config.material, self.sigma_um).reflectance
+        reflectance = self.bake.radiometry.reflectance
         terms = spectral_integral.integrate(*of, self.plan.w_terms, reflectance)
         # T_k at the nodes of w, (w node, k)
         x = 2.0 * w_nodes(self.plan.w_terms) - 1.0
@@ -109,7 +110,7 @@ class Setting:
     @cached_property
     def _reflectance(self) -> NDArray[np.float32]:
         """What of R stays inside the integral, (wavelengths of all rings, w nodes)."""
-        reflectance = Radiometry(self.light, self.config.material, self.sigma_um).reflectance
+        reflectance = self.bake.radiometry.reflectance
         return spectral_integral.at_nodes(reflectance, self.plan.rings.rho(), self._w, self.rules)
 
     def rule_of_ring(self, ring: int) -> Quadrature:
@@ -134,8 +135,9 @@ class Setting:
 def first_bake(field: HeightField, config: Config, layout: PolarLayout) -> tuple[PolarPowerSpectrum, Setting]:
     """The spectrum and the setting of a table of a layout."""
     seen = crop_to_window(field, config.coherence.sigma_um).centred()
-    made, chosen = plan.make([seen], config.coherence.sigma_um, config.light, None, BUDGET, layout)
-    return made, Setting(seen, config, chosen)
+    trial = plan.start([seen], config.coherence.sigma_um, config.light, None, BUDGET, layout)
+    chosen = plan.choose(trial, None, BUDGET, layout)
+    return trial.power_spectrum(chosen.azimuths), Setting(seen, config, chosen)
 
 
 def make(field: HeightField, config: Config, layout: PolarLayout) -> Setting:

@@ -13,7 +13,7 @@ from pipeline.evaluation.speed import memory, nufft, plain, polar_bake, setting,
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.nufft import NufftRun
 from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM, Paper, PaperTable
-from pipeline.evaluation.speed.polar_bake import PolarBake, Stages
+from pipeline.evaluation.speed.polar_bake import Stages, TimedBake
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of, timed
 from pipeline.evaluation.speed.transforms import Transforms
@@ -205,7 +205,7 @@ class _Suite:
             notes=self._notes,
         )
 
-    def _numpy(self, main: Setting, baked: PolarBake, samples: Array) -> tuple[float, RelativeError]:
+    def _numpy(self, main: Setting, baked: TimedBake, samples: Array) -> tuple[float, RelativeError]:
         """Seconds of plain numpy for a (texel, wavelength) pair, and how it agrees with the table's samples."""
         rng = np.random.default_rng(_SEED)
         rings = np.linspace(1, main.plan.rings.count - 1, self._effort.numpy_nodes).astype(int)
@@ -237,7 +237,7 @@ class _Suite:
         self._progress("FINUFFT", 1.0)
         return routed, relative_error(routed.samples.astype(np.float64), here, _FLOOR)
 
-    def _polar(self, main: Setting, baked: PolarBake, routed: NufftRun | None, numpy_pair_s: float) -> None:
+    def _polar(self, main: Setting, baked: TimedBake, routed: NufftRun | None, numpy_pair_s: float) -> None:
         """The polar table over its grid; the same tables by FINUFFT and by plain numpy, which err by as much."""
         grating = main.plan.azimuths.stretch < _GRATING_STRETCH
         layouts = [layout for layout in self._effort.polar if layout != GRATING or grating]
@@ -263,7 +263,7 @@ class _Suite:
                 self._points.append(replace(point, method=NUFFT, seconds=routed.seconds(chosen), scaled=True))
             self._progress("polar tables", (i + 1) / len(layouts))
 
-    def _textures(self, main: Setting, baked: PolarBake) -> None:
+    def _textures(self, main: Setting, baked: TimedBake) -> None:
         """The polar table in few RGBA textures of half floats."""
         most = most_textures(baked.table)
         for count in sorted({min(count, most) for count in self._effort.textures}):

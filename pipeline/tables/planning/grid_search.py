@@ -10,13 +10,12 @@ from math import asinh, ceil, sqrt
 import numpy as np
 
 from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
-from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.errors import AccuracyError
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.scene import Scene
 from pipeline.tables.planning.anisotropy import anisotropy
-from pipeline.tables.planning.candidate import Ingredients
 from pipeline.tables.planning.probes import Probes
+from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar.layout import PolarLayout
 
 _GRID_SHARE = 0.65  # of the budget, by rings and azimuths as the probes see it
@@ -33,40 +32,35 @@ class GridSearch:
     """The search over one surface's grids. What a layout sets stays as it is set."""
 
     def __init__(
-        self,
-        of: Ingredients,
-        layout: PolarLayout,
-        scene: Scene | None,
-        rho_max: float,
-        delta_e: float,
-        exposure_ru: float,
+        self, trial: Trial, layout: PolarLayout, scene: Scene | None, delta_e: float, exposure_ru: float
     ) -> None:
-        self._of, self._layout, self._scene = of, layout, scene
-        self._rho_max, self._delta_e, self._exposure_ru = rho_max, delta_e, exposure_ru
-        self._stretch, self._axis = anisotropy(of.stack)
-        self._made: PolarPowerSpectrum | None = None
+        self._trial, self._bake, self._layout, self._scene = trial, trial.bake, layout, scene
+        self._delta_e, self._exposure_ru = delta_e, exposure_ru
+        self._rho_max, self._is_line = trial.bake.rho_max, trial.bake.radiometry.light.is_line
+        self._stretch, self._axis = anisotropy(trial.stack)
 
-    def run(self) -> tuple[PolarPowerSpectrum, Rings, float | None]:
-        """E on the azimuths chosen, the rings, and the mean error at the probes, None where nothing was searched.
+    def run(self) -> tuple[Azimuths, Rings, float | None]:
+        """The azimuths and rings chosen, and the mean error at the probes, None where nothing was searched.
 
         Raises AccuracyError where E would not fit into memory.
         """
         rings, azimuths = self._start()
         # what does not fit is refused before anything is measured
-        self._power_spectrum(azimuths)
+        self._require_memory(azimuths)
         error = None
         if "auto" in (self._layout.rings, self._layout.azimuths):
             rings, azimuths, error = self._smallest(rings, azimuths)
-        return self._power_spectrum(azimuths), self._rings(rings), error
+            self._require_memory(azimuths)
+        return self._azimuths(azimuths), self._rings(rings), error
 
     def _start(self) -> tuple[int, int]:
         """Rings and azimuths to begin with: both follow the window, and the error falls with their square."""
         finer = sqrt(_BASE_DELTA_E / self._delta_e)
-        window = self._of.stack.sigma_um / _BASE_SIGMA_UM
+        window = self._bake.sigma_um / _BASE_SIGMA_UM
         x = asinh(self._rho_max / self._r0)
         step = (
-            0.5 * x / (self._of.radius_per_um[-1] * 2.0 * np.pi * self._of.stack.sigma_um)
-            if self._of.is_line
+            0.5 * x / (self._bake.radius_per_um[-1] * 2.0 * np.pi * self._bake.sigma_um)
+            if self._is_line
             else _BASE_RING_STEP
         )
         rings = int(np.clip(x / step * finer, self._least_rings, _MOST_RINGS))
@@ -81,31 +75,29 @@ class GridSearch:
     def _r0(self) -> float:
         """Rings are even where the specular lobe's width rules; under a laser line, everywhere."""
         widest = 4.0 * self._rho_max
-        return widest if self._of.is_line else min(_BASE_R0 * _BASE_SIGMA_UM / self._of.stack.sigma_um, widest)
+        return widest if self._is_line else min(_BASE_R0 * _BASE_SIGMA_UM / self._bake.sigma_um, widest)
 
     @property
     def _least_rings(self) -> int:
         """So many that the specular lobe is seen, which random probes hardly meet: its own width apart there."""
-        lobe = 1e-3 * self._of.lambda_min_nm * sigma_f(self._of.stack.sigma_um)
+        lobe = 1e-3 * self._bake.lambda_min_nm * sigma_f(self._bake.sigma_um)
         return max(_LEAST_RINGS, ceil(self._r0 * asinh(self._rho_max / self._r0) / lobe))
 
     def _rings(self, count: int) -> Rings:
         return Rings(count, self._r0, self._rho_max)
 
-    def _power_spectrum(self, azimuths: int) -> PolarPowerSpectrum:
-        """E on so many azimuths: the last one is kept, for the search varies rings in between."""
-        if self._made is None or self._made.azimuths.count != azimuths:
-            need = 4 * azimuths * self._of.s_nodes * len(self._of.radius_per_um)
-            if need > _MOST_BYTES:
-                raise AccuracyError(
-                    f"the power spectrum on {azimuths} azimuths and {self._of.s_nodes} nodes in s needs "
-                    f"{need / 2**30:.1f} GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller "
-                    "coherence.sigma_um, lower the heights or raise accuracy.delta_e."
-                )
-            # its memory may serve the next one
-            self._made = None
-            self._made = self._of.power_spectrum(Azimuths(azimuths, self._stretch, self._axis))
-        return self._made
+    def _azimuths(self, count: int) -> Azimuths:
+        return Azimuths(count, self._stretch, self._axis)
+
+    def _require_memory(self, azimuths: int) -> None:
+        """Raises AccuracyError where E on this number of azimuths would not fit into memory."""
+        need = 4 * azimuths * self._bake.s_nodes * len(self._bake.radius_per_um)
+        if need > _MOST_BYTES:
+            raise AccuracyError(
+                f"the power spectrum on {azimuths} azimuths and {self._bake.s_nodes} nodes in s needs "
+                f"{need / 2**30:.1f} GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller "
+                "coherence.sigma_um, lower the heights or raise accuracy.delta_e."
+            )
 
     def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
         """Rings and azimuths whose error is within the budget at the least product, as far as a model tells."""
@@ -151,11 +143,12 @@ class GridSearch:
 
     @cached_property
     def _probes(self) -> Probes:
-        return Probes(self._of, self._scene, self._rho_max, self._exposure_ru)
+        return Probes(self._trial, self._scene, self._exposure_ru)
 
     def _error(self, rings: int, azimuths: int) -> float:
         """Mean CIELAB error at the probes of a table of this size."""
-        return self._probes.error(self._of.table(self._power_spectrum(azimuths), self._rings(rings)))
+        self._require_memory(azimuths)
+        return self._probes.error(self._trial.table(self._azimuths(azimuths), self._rings(rings)))
 
 
 def _other(count: int, coarser: int) -> int:

@@ -12,12 +12,15 @@ import numpy as np
 
 from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, Rings
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.material import Material
 from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.planning.candidate import Ingredients
 from pipeline.tables.planning.grid_search import GridSearch
+from pipeline.tables.planning.trial import Trial
+from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 
 # shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
@@ -54,7 +57,23 @@ class Plan:
 
     @property
     def texels(self) -> int:
+        """Texels of one output of the table."""
         return self.rings.count * self.azimuths.count
+
+    def bake(self, radiometry: Radiometry, budget: Budget, layout: PolarLayout) -> PolarBake:
+        """The settings of the bake that this plan is of, under any light of its wavelengths and any material."""
+        light = radiometry.light
+        return PolarBake(
+            radiometry=radiometry,
+            lambda_min_nm=light.lambda_min_nm,
+            rho_max=self.rings.rho_max,
+            spacing=_spacing(_probing_light(light, layout)),
+            terms=self.terms,
+            tolerance=AMPLITUDE_SHARE * budget.delta_e,
+            s_nodes=self.s_nodes,
+            w_terms=self.w_terms,
+            quadrature_error=budget.quadrature,
+        )
 
 
 def rho_max(scene: Scene | None) -> float:
@@ -65,7 +84,7 @@ def rho_max(scene: Scene | None) -> float:
     return float(min(RHO_MAX, max(np.sin(np.radians(light.theta_deg)) for light in scene.lights) + view))
 
 
-def make(
+def start(
     fields: Sequence[HeightField],
     sigma_um: float,
     light: Light,
@@ -73,33 +92,38 @@ def make(
     budget: Budget,
     layout: PolarLayout,
     progress: Progress = silent,
-) -> tuple[power_spectrum.PolarPowerSpectrum, Plan]:
-    """The power spectrum on the azimuths that the budget asks for, and the whole plan.
+) -> Trial:
+    """Fixes all terms and nodes for a budget, and transforms the first window.
 
-    `fields` are the places of the window (pipeline.surface.windows); E is their mean, planned on the first. Of the
-    light only its wavelengths count: a range, or a line. Raises AccuracyError where the budget is out of reach or E
-    would not fit into memory.
+    fields: height fields of the coherence windows (pipeline.surface.windows), the middle's first.
+    sigma_um: standard deviation of the window, um. light: only its wavelengths count, a range or a line.
     """
-    lambda_min, outer = light.lambda_min_nm, rho_max(scene)
+    lambda_min, probing = light.lambda_min_nm, _probing_light(light, layout)
     z = expansion.largest_phase(max(field.half_range_um for field in fields), lambda_min)
     amplitude = AMPLITUDE_SHARE * budget.delta_e
-    terms = expansion.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms
-    nodes = expansion.chebyshev_order(power_spectrum.S_REACH * z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1
-    light = _probing_light(light, layout)
-    line = light.is_line
-    spacing = power_spectrum.SPACING_OF_A_LINE if line else power_spectrum.SPACING
-    radius = power_spectrum.radii(sigma_um, outer / (1e-3 * lambda_min), spacing)
-    built = power_spectrum.chebyshev_stack(fields[0], sigma_um, radius[-1], terms, amplitude, progress)
-    w_terms = (
-        _w_terms(z * lambda_min / _middle_nm(light), light, budget) if layout.w_terms == "auto" else layout.w_terms
+    z_luminous = z * lambda_min / _middle_nm(probing)
+    bake = PolarBake(
+        radiometry=Radiometry(probing, Material(), sigma_um),
+        lambda_min_nm=lambda_min,
+        rho_max=rho_max(scene),
+        spacing=_spacing(probing),
+        terms=expansion.chebyshev_order(z, amplitude) + 1 if layout.terms == "auto" else layout.terms,
+        tolerance=amplitude,
+        s_nodes=expansion.chebyshev_order(power_spectrum.S_REACH * z, min(0.1, _NODES_SHARE * budget.delta_e)) + 1,
+        w_terms=_w_terms(z_luminous, probing, budget) if layout.w_terms == "auto" else layout.w_terms,
+        quadrature_error=budget.quadrature,
     )
-    of = Ingredients(built, radius, nodes, w_terms, light, lambda_min, budget.quadrature)
-    made, rings, error = GridSearch(of, layout, scene, outer, budget.delta_e, budget.exposure_ru).run()
-    for field in fields[1:]:
-        built = power_spectrum.chebyshev_stack(field, sigma_um, radius[-1], terms, amplitude, progress)
-        made.values[...] += power_spectrum.build(built, made.azimuths, radius, lambda_min, nodes).values
-    made.values[...] /= np.float32(len(fields))
-    return made, Plan(terms, nodes, w_terms, made.azimuths, rings, error)
+    return Trial(bake, fields[0], progress)
+
+
+def choose(trial: Trial, scene: Scene | None, budget: Budget, layout: PolarLayout) -> Plan:
+    """Searches the smallest grid that keeps a budget on the trial's window.
+
+    Raises AccuracyError where the power spectrum would not fit into memory.
+    """
+    azimuths, rings, error = GridSearch(trial, layout, scene, budget.delta_e, budget.exposure_ru).run()
+    bake = trial.bake
+    return Plan(bake.terms, bake.s_nodes, bake.w_terms, azimuths, rings, error)
 
 
 def _w_terms(phase: float, light: Light, budget: Budget) -> int:
@@ -122,3 +146,8 @@ def _middle_nm(light: Light) -> float:
     if light.is_line:
         return light.lambda_min_nm
     return float(np.clip(_LUMINOUS_NM, *light.range_nm))
+
+
+def _spacing(light: Light) -> float:
+    """Distance of E's radii, in sigma_f: an integral over wavelengths averages out what a line shows."""
+    return power_spectrum.SPACING_OF_A_LINE if light.is_line else power_spectrum.SPACING

@@ -3,15 +3,13 @@
 import numpy as np
 
 from pipeline.diffraction import power_spectrum
-from pipeline.optics import brdf, geometry
+from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.geometry import Array
-from pipeline.optics.light import trapezoid
-from pipeline.optics.material import Material
 from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Scene
 from pipeline.tables.planning.anisotropy import probing_angles
-from pipeline.tables.planning.candidate import Ingredients
+from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar import table as polar
 
@@ -26,8 +24,9 @@ _SEED = 19991
 class Probes:
     """Exact means: from E at the probes' own rings and azimuths, with spare terms in |w|."""
 
-    def __init__(self, of: Ingredients, scene: Scene | None, rho_max: float, exposure_ru: float) -> None:
-        half, counts = probing_angles(of.stack, _ANGLES, np.random.default_rng(_SEED))
+    def __init__(self, trial: Trial, scene: Scene | None, exposure_ru: float) -> None:
+        bake = trial.bake
+        half, counts = probing_angles(trial.stack, _ANGLES, np.random.default_rng(_SEED))
         # angles of half a turn serve its other half as well
         angles = np.concatenate([half, half + np.pi])
         wi, wr = random_pairs(scene, _SHARES * len(angles), _SEED)
@@ -37,13 +36,13 @@ class Probes:
         order = order[np.concatenate([np.arange(_INNERMOST), beyond])]
         stands_for = np.where(np.arange(len(order)) < _INNERMOST, 1, _EVERY)[:, None]
         # the pairs of a ring share its radius and keep their own w
-        rho = np.minimum(np.median(np.hypot(uvw[order, 0], uvw[order, 1]), axis=1), rho_max)
+        rho = np.minimum(np.median(np.hypot(uvw[order, 0], uvw[order, 1]), axis=1), bake.rho_max)
         w = uvw[order, 2]
         along_x, along_y = np.outer(rho, np.cos(angles)), np.outer(rho, np.sin(angles))
         self._uvw = np.stack([along_x, along_y, w], axis=-1).reshape(-1, 3)
-        factor = brdf.direction_factor(Material(), trapezoid(of.light, 1.0), wi[order], wr[order])
+        factor = bake.radiometry.direction_factor(wi[order], wr[order])
         self._factor = factor.reshape(-1, 1)
-        self._exact = _exact(of, half, rho, w).reshape(-1, 3)
+        self._exact = _exact(trial, half, rho, w).reshape(-1, 3)
         self._counts = (stands_for * np.tile(counts, 2)).ravel()
         self._exposure_ru = exposure_ru
 
@@ -54,12 +53,12 @@ class Probes:
         return float(np.average(error, weights=self._counts))
 
 
-def _exact(of: Ingredients, half_turn: Array, rho: Array, w: Array) -> Array:
+def _exact(trial: Trial, half_turn: Array, rho: Array, w: Array) -> Array:
     """XYZ / (C cos ti) (rhos, angles, 3) on rings `rho` at both half turns' angles, for `w` (rhos, angles)."""
-    found = power_spectrum.gather(of.stack, half_turn, of.radius_per_um, of.lambda_min_nm, of.s_nodes)
-    rules = of.rules(rho)
-    s_max, w_terms = power_spectrum.s_max(of.lambda_min_nm), of.w_terms + _SPARE_W_TERMS
-    terms = spectral_integral.integrate(found, of.radius_per_um, s_max, rho, rules, w_terms)
+    bake = trial.bake
+    found = power_spectrum.gather(trial.stack, half_turn, bake.radius_per_um, bake.lambda_min_nm, bake.s_nodes)
+    s_max, w_terms = power_spectrum.s_max(bake.lambda_min_nm), bake.w_terms + _SPARE_W_TERMS
+    terms = spectral_integral.integrate(found, bake.radius_per_um, s_max, rho, bake.rules(rho), w_terms)
     x = polar.w_position(rho[:, None], w)
     cosines = np.cos(np.arange(terms.shape[2]) * np.arccos(x)[..., None])
     return np.asarray(np.einsum("rcka,rak->rac", terms, cosines))

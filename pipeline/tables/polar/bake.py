@@ -1,0 +1,71 @@
+"""The steps from a height field to a polar table, once every number of terms and nodes is fixed."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from kernels.spectral_operator import RingQuadratures
+from pipeline.diffraction import power_spectrum
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.polar_grid import Azimuths, Rings
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.optics.brdf import Radiometry
+from pipeline.optics.geometry import Array
+from pipeline.progress import Progress, silent
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.table import PolarTable
+
+
+@dataclass(frozen=True)
+class PolarBake:
+    """The settings of a polar bake, and its steps: stack, power spectrum E, quadratures, table.
+
+    radiometry: light, material and coherence window of the tables.
+    lambda_min_nm: shortest wavelength that E serves, nm.
+    rho_max: |(u, v)| of the outermost ring, dimensionless.
+    spacing: distance of E's radii, in widths sigma_f of the window's transform.
+    terms: Chebyshev terms of the stack. tolerance: of P, in amplitude, by the window's cut.
+    s_nodes, w_terms: nodes of E in s = k |w|, and Chebyshev terms of tables in |w|.
+    quadrature_error: relative error that the wavelengths of each ring may leave.
+    """
+
+    radiometry: Radiometry
+    lambda_min_nm: float
+    rho_max: float
+    spacing: float
+    terms: int
+    tolerance: float
+    s_nodes: int
+    w_terms: int
+    quadrature_error: float
+
+    @cached_property
+    def radius_per_um(self) -> Array:
+        """Radii of E (n_r,), 1/um, ascending from 0."""
+        return power_spectrum.radii(self.sigma_um, self.rho_max / (1e-3 * self.lambda_min_nm), self.spacing)
+
+    @property
+    def sigma_um(self) -> float:
+        """Standard deviation of the coherence window, um."""
+        return self.radiometry.sigma_um
+
+    def stack(self, field: HeightField, progress: Progress = silent) -> Stack:
+        """Transforms the Chebyshev terms of one window's height field (float32)."""
+        reach = float(self.radius_per_um[-1])
+        return power_spectrum.chebyshev_stack(field, self.sigma_um, reach, self.terms, self.tolerance, progress)
+
+    def power_spectrum(self, stack: Stack, azimuths: Azimuths) -> PolarPowerSpectrum:
+        """Gathers E from a stack, on these azimuths. Raises DeviceError where no device works."""
+        return power_spectrum.build(stack, azimuths, self.radius_per_um, self.lambda_min_nm, self.s_nodes)
+
+    def rules(self, rho: Array) -> RingQuadratures:
+        """Chooses the wavelengths of rings at radii `rho` (n_rings,), for `quadrature_error`.
+
+        Raises AccuracyError where no step is fine enough.
+        """
+        return quadrature.choose(self.radiometry.illumination, rho, self.sigma_um, self.quadrature_error)
+
+    def table(self, power: PolarPowerSpectrum, rings: Rings, rules: RingQuadratures) -> PolarTable:
+        """Integrates E over the wavelengths of every ring. Raises AccuracyError where memory would not hold it."""
+        return polar.build(power, rings, rules, self.w_terms, self.radiometry.reflectance)
