@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipeline.arrays import Array
 from pipeline.errors import InputError
-from pipeline.optics.geometry import Array
 
 
 def schlick(cos_theta: ArrayLike, ior: float) -> Array:

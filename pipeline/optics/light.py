@@ -7,10 +7,10 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from pipeline.arrays import Array
 from pipeline.errors import InputError
 from pipeline.optics import colour_data
 from pipeline.optics.fresnel import read_columns
-from pipeline.optics.geometry import Array
 from pipeline.validated import Pair, Validated, existing_file, is_csv
 
 # the step, nm, at which integrals over wavelength have converged: docs/accuracy.md

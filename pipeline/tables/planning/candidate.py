@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 from kernels.spectral_operator import RingQuadratures
+from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.tables.polar import quadrature

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.optics.material import Material
 from pipeline.optics.random_directions import random_pairs
