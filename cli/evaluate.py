@@ -68,12 +68,12 @@ def _read_wavelengths(text: str) -> list[float]:
 
 def _read_directions(path: Path) -> list[list[float]]:
     """Rows of four angles in degrees; a header line may lead. Faults name the line."""
-    from pipeline.errors import ScanError
+    from pipeline.errors import InputError
 
     try:
         text = sys.stdin.read().removeprefix("\ufeff") if str(path) == "-" else path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise ScanError(f"{path}: cannot be read as text ({error})") from None
+        raise InputError(f"{path}: cannot be read as text ({error})") from None
     rows: list[list[float]] = []
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.split("#")[0].strip()
@@ -81,22 +81,22 @@ def _read_directions(path: Path) -> list[list[float]]:
             continue
         rows.append(_read_row(content, f"{path}: line {number}"))
     if not rows:
-        raise ScanError(f"{path}: expected rows of {','.join(_COLUMNS)} in degrees, got none")
+        raise InputError(f"{path}: expected rows of {','.join(_COLUMNS)} in degrees, got none")
     return rows
 
 
 def _read_row(content: str, place: str) -> list[float]:
-    from pipeline.errors import ScanError
+    from pipeline.errors import InputError
 
     try:
         row = [float(cell) for cell in content.split(",")]
     except ValueError:
         row = []
     if len(row) != 4:
-        raise ScanError(f"{place}: expected four numbers {','.join(_COLUMNS)}, got {content!r}")
+        raise InputError(f"{place}: expected four numbers {','.join(_COLUMNS)}, got {content!r}")
     # NaN fails every comparison
     if not (0 <= row[0] < 90 and 0 <= row[2] < 90 and abs(row[1]) < 1e6 and abs(row[3]) < 1e6):
-        raise ScanError(f"{place}: expected theta in [0, 90) and finite phi, degrees, got {content!r}")
+        raise InputError(f"{place}: expected theta in [0, 90) and finite phi, degrees, got {content!r}")
     return row
 
 

@@ -75,11 +75,11 @@ def refuse_unreached(xyz: Any, what: str, source: str) -> None:
     """Tables made for a scene do not know the rest: NaN becomes a message."""
     import numpy as np
 
-    from pipeline.errors import ScanError
+    from pipeline.errors import InputError
 
     unreached = int(np.sum(~np.isfinite(xyz).all(axis=-1)))
     if unreached:
-        raise ScanError(
+        raise InputError(
             f"{source}: {unreached} of the directions of {what} are outside the [scene] that it was baked for; leave "
             "[scene] out to bake all directions"
         )

@@ -118,8 +118,8 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
 
 
 def _surface(role: str, config: Any, store: Any) -> Any:
-    """A surface of the bench. Raises ScanError for a flat one."""
-    from pipeline.errors import ScanError
+    """A surface of the bench. Raises InputError for a flat one."""
+    from pipeline.errors import InputError
     from pipeline.evaluation.figures.figure import Surface
     from pipeline.stages import run, surface
 
@@ -129,7 +129,7 @@ def _surface(role: str, config: Any, store: Any) -> Any:
         made = run.execute(config, run.plan(config, store, "surface"), store, progress, told)
     field = surface.load(store.open("surface", made["surface"].key))
     if field.half_range_um == 0.0:
-        raise ScanError(f"{config.name}: expected a surface with a relief for --{role}, got a flat one")
+        raise InputError(f"{config.name}: expected a surface with a relief for --{role}, got a flat one")
     return Surface(config, field, config.surface.recipe is None)
 
 

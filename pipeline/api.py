@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipeline.config import read
 from pipeline.config.models import Config
-from pipeline.errors import AccuracyError, ScanError
+from pipeline.errors import AccuracyError, InputError
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
@@ -28,7 +28,7 @@ def load_scan(path: str | Path, **keys: Any) -> HeightField:
     Returns the height field: heights_um, float64 (ny, nx), um, x growing with the column and y up with the row;
     pitch_um, (x, y), um. Holes are filled, the surface is levelled (by a plane unless told otherwise) and centred.
 
-    Raises ConfigError for keys that are wrong; ScanError where the file cannot be read or trusted, or lacks a unit
+    Raises ConfigError for keys that are wrong; InputError where the file cannot be read or trusted, or lacks a unit
     (it names the key to give).
     """
     from pipeline.surface import load
@@ -36,7 +36,7 @@ def load_scan(path: str | Path, **keys: Any) -> HeightField:
 
     path = Path(path)
     if not path.is_file():
-        raise ScanError(f"{path}: no such scan file")
+        raise InputError(f"{path}: no such scan file")
     section = {"path": str(path), **keys}
     surface = read.parse({"name": "scan", "surface": section}, str(path), Path.cwd()).surface
     field, _ = load.load_scan(surface)
@@ -79,7 +79,7 @@ def bake(
 
     Returns where the results are, and the measured errors.
 
-    Raises a class of pipeline.errors: ConfigError with every fault; ScanError for a scan that cannot be trusted;
+    Raises a class of pipeline.errors: ConfigError with every fault; InputError for a scan that cannot be trusted;
     AccuracyError for a budget out of reach, or one that the maps miss (results are written all the same);
     DeviceError without a working OpenCL device; DamagedError for what is no longer what it was; StorageError where
     nothing can be written.

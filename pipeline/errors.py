@@ -23,8 +23,8 @@ class ConfigError(BakeError):
         super().__init__("\n".join(lines))
 
 
-class ScanError(BakeError):
-    """A scan cannot be read, or cannot be trusted as a height field."""
+class InputError(BakeError):
+    """An input file (a scan, a CSV of a light or a metal, a list of directions) cannot be read or trusted."""
 
     exit_code = 3
 

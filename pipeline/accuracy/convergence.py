@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.accuracy.checks import MAP_RADIUS
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.polar_grid import TILE, Rings
@@ -13,7 +14,6 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import STEP_NM, MeanReference
 from pipeline.optics import brdf, geometry
 from pipeline.optics.colour_error import delta_e
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.tables.evaluate import Evaluator, Map, table_evaluator
 from pipeline.tables.planning import plan

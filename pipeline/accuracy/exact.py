@@ -1,8 +1,8 @@
 """The exact reference of a config: what its tables are measured against."""
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField

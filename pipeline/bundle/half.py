@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 # a scaled table peaks in [2^14, 2^15): one octave below half's largest number is left to filters that sum
 _PEAK_EXPONENT = 14

@@ -6,9 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.optics import fresnel
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.validated import Validated
 

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.accuracy.exact import reference_of
+from pipeline.arrays import Array
 from pipeline.bundle import half
 from pipeline.bundle.manifest import ColourErrors, PolarLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e
-from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 
+from pipeline.arrays import Array
 from pipeline.bundle import exr, taylor_half, taylor_readme
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
-from pipeline.optics.geometry import Array
 from pipeline.stages import taylor_table
 from pipeline.store.store import Artifact
 from pipeline.tables.taylor import grid

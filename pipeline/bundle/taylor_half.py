@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, relative_error
+from pipeline.arrays import Array
 from pipeline.bundle import half
 from pipeline.bundle.manifest import RelativeErrors, TaylorLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour_error import delta_e
-from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor.table import TaylorTable

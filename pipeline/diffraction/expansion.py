@@ -9,8 +9,8 @@ from math import exp, pi
 import numpy as np
 from scipy.special import jv
 
+from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 

@@ -15,7 +15,7 @@ from math import asinh, pi
 
 import numpy as np
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 RHO_MAX = 2.0  # |(u, v)| of grazing light seen from the light's own side
 TILE = 32  # azimuths come in whole vectors for either half turn

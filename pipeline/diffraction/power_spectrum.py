@@ -14,11 +14,11 @@ from scipy.special import jv
 
 from kernels import polar_spectrum
 from kernels.spectral_operator import chebyshev
+from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.upload import upload
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import diffraction
+from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.upload import upload
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent

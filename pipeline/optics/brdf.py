@@ -10,8 +10,8 @@ from math import pi
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.optics import fresnel, geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 

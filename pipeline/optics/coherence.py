@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 from pipeline.validated import Validated
 
 # exp(-8.5^2 / 2) = 2e-16: beyond this many sigma the window is below float64's rounding of its peak

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import platformdirs
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 from pipeline.store import digest
 
 Tables = dict[str, Any]

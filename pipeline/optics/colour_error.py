@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.optics import colour_data
-from pipeline.optics.geometry import Array
 
 # the exposures of [D14] table 2, in RU (1 RU saturates a mirror seen in its own reflection)
 EXPOSURES_RU = (1.0, 1000.0, 7500.0)

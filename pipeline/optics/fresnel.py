@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.errors import ScanError
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
+from pipeline.errors import InputError
 
 
 def schlick(cos_theta: ArrayLike, ior: float) -> Array:
@@ -32,16 +32,16 @@ def reflectance(cos_theta: ArrayLike, index: ArrayLike) -> Array:
 def metal_index(metal: str, lambda_nm: Array) -> NDArray[np.complex128]:
     """n + ik at wavelengths, linear between the samples of "Au" or of a CSV of lambda_nm,n,k.
 
-    Raises ScanError for a CSV that is not three ascending columns covering the wavelengths, or no metal's.
+    Raises InputError for a CSV that is not three ascending columns covering the wavelengths, or no metal's.
     """
     source = files("pipeline.optics").joinpath("gold_johnson_christy_1972.csv") if metal == "Au" else Path(metal)
     table = read_columns(source.read_bytes(), 3, metal)
     low, high = table[0, 0], table[-1, 0]
     if lambda_nm.min() < low or lambda_nm.max() > high:
         asked = f"{lambda_nm.min():g}..{lambda_nm.max():g}"
-        raise ScanError(f"{metal}: has indices for {low:g}..{high:g} nm, but {asked} nm are needed")
+        raise InputError(f"{metal}: has indices for {low:g}..{high:g} nm, but {asked} nm are needed")
     if np.any(table[:, 1] <= 0) or np.any(table[:, 2] < 0) or np.any(np.hypot(table[:, 1] - 1, table[:, 2]) < 1e-6):
-        raise ScanError(f"{metal}: expected n > 0 and k >= 0, and not n = 1 with k = 0, which reflects nothing")
+        raise InputError(f"{metal}: expected n > 0 and k >= 0, and not n = 1 with k = 0, which reflects nothing")
     n, k = (np.interp(lambda_nm, table[:, 0], table[:, column]) for column in (1, 2))
     return np.asarray(n + 1j * k)
 
@@ -49,12 +49,12 @@ def metal_index(metal: str, lambda_nm: Array) -> NDArray[np.complex128]:
 def read_columns(data: bytes, columns: int, name: str) -> Array:
     """A CSV of numbers whose first column ascends; '#' starts a comment, one header line may lead.
 
-    Raises ScanError naming the line that does not fit.
+    Raises InputError naming the line that does not fit.
     """
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ScanError(f"{name}: expected a CSV of {columns} columns in UTF-8, got other bytes") from None
+        raise InputError(f"{name}: expected a CSV of {columns} columns in UTF-8, got other bytes") from None
     rows: list[list[float]] = []
     header = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -65,13 +65,13 @@ def read_columns(data: bytes, columns: int, name: str) -> Array:
             row = [float(cell) for cell in content.replace(";", ",").split(",")]
         except ValueError:
             if rows or header:
-                raise ScanError(f"{name}: line {number}: expected {columns} numbers, got {content!r}") from None
+                raise InputError(f"{name}: line {number}: expected {columns} numbers, got {content!r}") from None
             header = True
             continue
         if len(row) != columns or not np.all(np.isfinite(row)):
-            raise ScanError(f"{name}: line {number}: expected {columns} finite numbers, got {content!r}")
+            raise InputError(f"{name}: line {number}: expected {columns} finite numbers, got {content!r}")
         rows.append(row)
     table = np.array(rows)
     if len(rows) < 2 or np.any(np.diff(table[:, 0]) <= 0):
-        raise ScanError(f"{name}: expected at least two rows with ascending wavelengths in the first column")
+        raise InputError(f"{name}: expected at least two rows with ascending wavelengths in the first column")
     return table

@@ -4,9 +4,9 @@ Directions are float64 (..., 3) unit vectors pointing away from the surface, z t
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from pipeline.arrays import Array
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> Array:

@@ -13,7 +13,7 @@ wavelength. m > 0 leans back from the mirror direction towards the normal and th
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 
 def viewing_angle(theta_i: float, period_um: ArrayLike, lambda_um: ArrayLike, order: int = 1) -> Array:

@@ -7,8 +7,8 @@ exp(i s h) with s = k w < 0. Powers |c_m|^2 are shares of a mirror's and sum to 
 import numpy as np
 from scipy.special import jv
 
+from pipeline.arrays import Array
 from pipeline.optics import geometry
-from pipeline.optics.geometry import Array
 
 Values = Array | float
 

@@ -7,10 +7,10 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from pipeline.errors import ScanError
+from pipeline.arrays import Array
+from pipeline.errors import InputError
 from pipeline.optics import colour_data
 from pipeline.optics.fresnel import read_columns
-from pipeline.optics.geometry import Array
 from pipeline.validated import Pair, Validated, existing_file, is_csv
 
 # the step, nm, at which integrals over wavelength have converged: docs/accuracy.md
@@ -116,7 +116,7 @@ def trapezoid(light: Light, step_nm: float) -> Quadrature:
 def illuminant_at(name: str, lambda_nm: Array) -> Array:
     """Relative spectral power at wavelengths, linear between samples as CIE 15 has it for D65.
 
-    Raises ScanError where a CSV does not cover them or has no power.
+    Raises InputError where a CSV does not cover them or has no power.
     """
     if name == "E":
         return np.ones_like(lambda_nm)
@@ -128,7 +128,7 @@ def illuminant_at(name: str, lambda_nm: Array) -> Array:
     _require_covered(name, nodes, lambda_nm)
     values = np.interp(lambda_nm, nodes, power)
     if np.any(values < 0) or not np.any(values > 0):
-        raise ScanError(
+        raise InputError(
             f"{name}: expected spectral power >= 0, and above 0 at some of the {len(lambda_nm)} wavelengths of the "
             "integral; for a line use { lambda_nm = ... }"
         )
@@ -138,7 +138,7 @@ def illuminant_at(name: str, lambda_nm: Array) -> Array:
 def observer_at(name: str, lambda_nm: Array) -> Array:
     """Colour matching functions (L, 3) at wavelengths, linear between the 1 nm samples.
 
-    Raises ScanError where they do not cover them: those of 2015 start at 390 nm.
+    Raises InputError where they do not cover them: those of 2015 start at 390 nm.
     """
     nodes, values = colour_data.observer(name)
     _require_covered(name, nodes, lambda_nm)
@@ -147,7 +147,7 @@ def observer_at(name: str, lambda_nm: Array) -> Array:
 
 
 def _require_covered(name: str, nodes: Array, lambda_nm: Array) -> None:
-    """Raises ScanError where samples at `nodes` do not reach all wavelengths."""
+    """Raises InputError where samples at `nodes` do not reach all wavelengths."""
     if lambda_nm.min() < nodes[0] or lambda_nm.max() > nodes[-1]:
         asked = f"{lambda_nm.min():g}..{lambda_nm.max():g}"
-        raise ScanError(f"{name}: has values for {nodes[0]:g}..{nodes[-1]:g} nm, but {asked} nm are needed")
+        raise InputError(f"{name}: has values for {nodes[0]:g}..{nodes[-1]:g} nm, but {asked} nm are needed")

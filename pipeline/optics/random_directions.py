@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.optics import geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.scene import Scene
 
 # the rim itself is left out: cos -> 0 there

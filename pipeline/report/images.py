@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.errors import StorageError
-from pipeline.optics.geometry import Array
 
 # ISO interop ID of linear CIE XYZ, D65 white: without it many readers take Y for luminance and Z for depth
 _XYZ_SPACE = "lin_ciexyzd65_scene"

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import pixels
-from pipeline.optics.geometry import Array
 from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.config.models import Config
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.progress import Progress
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store import arrays, digest
@@ -67,13 +67,13 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
 
 
 def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: float, *, is_scan: bool) -> list[str]:
-    """What a user should know before trusting the bake. Raises ScanError for a hopelessly coarse pitch."""
+    """What a user should know before trusting the bake. Raises InputError for a hopelessly coarse pitch."""
     found = []
     known = statistics.reach_covered
     pitch = max(statistics.pitch_um)
     finest = 0.25e-3 * lambda_min_nm
     if known < _LEAST_KNOWN:
-        raise ScanError(
+        raise InputError(
             f"surface: a pitch of {pitch:g} um tells nothing of {100 * (1 - known):.1f} % of the frequencies that a "
             f"view can reach at {lambda_min_nm:g} nm; scan with {finest:.3f} um or finer, or use longer wavelengths"
         )

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.errors import ScanError
+from pipeline.arrays import Array
+from pipeline.errors import InputError
 from pipeline.surface.heightfield import HeightField
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
@@ -61,13 +61,13 @@ def condition(
 
     field: heights in um; samples that are not finite are holes. level: one of LEVELS (see `_level`).
     clip_percentile: (low, high) percentiles of the valid samples that heights are limited to, against dust.
-    Raises ScanError where no sample is valid; ValueError for an unknown level.
+    Raises InputError where no sample is valid; ValueError for an unknown level.
     """
     if level not in LEVELS:
         raise ValueError(f"expected one of {LEVELS}, got {level!r}")
     valid = np.isfinite(field.heights_um)
     if not valid.any():
-        raise ScanError("expected heights, found none: every sample of the scan is a hole; choose another channel")
+        raise InputError("expected heights, found none: every sample of the scan is a hole; choose another channel")
     holes = int(valid.size - np.count_nonzero(valid))
     record = ConditioningRecord(holes, holes / valid.size, level)
     heights, record = _level(field, valid, record)

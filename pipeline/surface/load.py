@@ -47,7 +47,7 @@ class ScanRecord:
 def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
     """The heights of surface.path in um, holes as NaN, and the record of how they were read.
 
-    The file's units win over the config's keys. Raises ScanError where the file cannot be read, a unit is
+    The file's units win over the config's keys. Raises InputError where the file cannot be read, a unit is
     missing (naming every key to set) or contradicted, or the values cannot be a height map.
     """
     if surface.path is None:
@@ -80,7 +80,7 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
 
 
 def _check_values(file: str, heights: NDArray[np.float64]) -> int:
-    """The number of holes. Raises ScanError for a grid or for values that no height map has."""
+    """The number of holes. Raises InputError for a grid or for values that no height map has."""
     check_shape(file, heights.shape)
     infinite = int(np.count_nonzero(np.isinf(heights)))
     if infinite:

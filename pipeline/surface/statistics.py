@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
+from pipeline.arrays import Array
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
-
-Array = NDArray[np.float64]
 
 # [D14] 6.3 takes 500 nm for all visible light
 _REPRESENTATIVE_WAVELENGTH_UM = 0.5

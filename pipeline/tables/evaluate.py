@@ -6,9 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 
 # XYZ (directions, 3) under 1 RU for wi, wr (directions, 3)

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from pipeline import Bundle, bake, load_scan
 from pipeline.bundle.evaluate import Bundle as Evaluator
 from pipeline.config.models import Config
-from pipeline.errors import AccuracyError, BakeError, ConfigError, DamagedError, ScanError, StorageError
+from pipeline.errors import AccuracyError, BakeError, ConfigError, DamagedError, InputError, StorageError
 from pipeline.optics.geometry import direction
 from tests.cli.tool import REPOSITORY, Tool, flip_a_byte
 from tests.schemas import faults, schema_of
@@ -205,8 +205,8 @@ def test_load_scan_takes_the_keys_of_a_config(tmp_path: Path) -> None:
         (lambda: load_scan(SCAN, colour=1), ConfigError, "surface.colour: unknown key"),
         (lambda: load_scan(SCAN, level="cubic"), ConfigError, "surface.level"),
         (lambda: load_scan(SCAN, recipe={"kind": "mirror"}), ConfigError, "got both"),
-        (lambda: load_scan(SCAN, pitch_um=0.3), ScanError, "override_file_units"),
-        (lambda: load_scan("none.npy"), ScanError, "no such scan file"),
+        (lambda: load_scan(SCAN, pitch_um=0.3), InputError, "override_file_units"),
+        (lambda: load_scan("none.npy"), InputError, "no such scan file"),
     ],
 )
 def test_faults_of_a_scan(load: Callable[[], object], fault: type[BakeError], text: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.arrays import Array
 from pipeline.bundle import evaluate, material
 from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.polar import grid_entry
@@ -17,7 +18,6 @@ from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
 from pipeline.optics import brdf, geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import table as table_stage

@@ -3,8 +3,8 @@
 import numpy as np
 from hypothesis import strategies as st
 
+from pipeline.arrays import Array
 from pipeline.optics import geometry
-from pipeline.optics.geometry import Array
 
 
 def directions(theta_max_deg: float = 89.0) -> st.SearchStrategy[Array]:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.optics import fresnel
 
 cosines = st.floats(0.0, 1.0)
@@ -119,7 +119,7 @@ def test_csv_is_read_linearly_between_samples(tmp_path, text):
 def test_bad_csv_names_the_file_and_the_line(tmp_path, text, said):
     """Whoever wrote the CSV is told which line does not fit, and what stands there."""
     path = write(tmp_path, text)
-    with pytest.raises(ScanError) as error:
+    with pytest.raises(InputError) as error:
         fresnel.metal_index(path, np.array([400.0]))
     assert path in str(error.value)
     assert said in str(error.value)
@@ -129,7 +129,7 @@ def test_bad_csv_names_the_file_and_the_line(tmp_path, text, said):
 def test_indices_are_not_extrapolated(tmp_path, lambda_nm):
     """Beyond its samples nothing is known of a metal."""
     path = write(tmp_path, "400,1,2\n500,3,6\n")
-    with pytest.raises(ScanError, match=r"400\.\.500 nm"):
+    with pytest.raises(InputError, match=r"400\.\.500 nm"):
         fresnel.metal_index(path, np.array([450.0, lambda_nm]))
 
 
@@ -138,5 +138,5 @@ def test_what_is_no_metal_is_refused(tmp_path, row):
     """n <= 0 and k < 0 have no meaning here; n = 1 with k = 0 reflects nothing and would divide by zero."""
     path = tmp_path / "odd.csv"
     path.write_text(f"lambda_nm,n,k\n300,{row}\n900,{row}\n")
-    with pytest.raises(ScanError, match="n > 0 and k >= 0"):
+    with pytest.raises(InputError, match="n > 0 and k >= 0"):
         fresnel.metal_index(str(path), np.array([500.0]))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.optics.light import LaserLine, Light, illuminant_at, observer_at, trapezoid
 
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
@@ -105,7 +105,7 @@ def test_csv_that_is_no_illuminant_is_refused(tmp_path, text, said):
     """A light must have some power, nowhere less than none, over the whole range asked for."""
     path = tmp_path / "light.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(ScanError) as error:
+    with pytest.raises(InputError) as error:
         trapezoid(Light(illuminant=str(path)), 5.0)
     assert said in str(error.value)
     assert str(path) in str(error.value)
@@ -113,14 +113,14 @@ def test_csv_that_is_no_illuminant_is_refused(tmp_path, text, said):
 
 def test_named_illuminant_that_ends_early_is_refused():
     """ISO 7589's lights end before 780 nm: what lies beyond is not made up."""
-    with pytest.raises(ScanError, match=r"350\.\.690 nm"):
+    with pytest.raises(InputError, match=r"350\.\.690 nm"):
         trapezoid(Light(illuminant="ISO 7589 Studio Tungsten"), 5.0)
 
 
 def test_observer_that_begins_late_is_refused():
     """The observers of 2015 begin at 390 nm; their last value is not carried on to 380."""
     spectrum = Light(illuminant="E", observer="CIE 2015 2 Degree Standard Observer")
-    with pytest.raises(ScanError, match=r"390\.\.830 nm, but 380\.\.780"):
+    with pytest.raises(InputError, match=r"390\.\.830 nm, but 380\.\.780"):
         trapezoid(spectrum, 5.0)
     within = trapezoid(spectrum.model_copy(update={"range_nm": (390.0, 780.0)}), 5.0)
     assert within.weights[:, 1].sum() == pytest.approx(1.0, rel=1e-14)

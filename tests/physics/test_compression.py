@@ -5,13 +5,13 @@ import pytest
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
+from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.reference import Reference
 from pipeline.optics import brdf, geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.colour_error import delta_e
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Light, trapezoid
 from pipeline.optics.material import Material
 from pipeline.tables.evaluate import Map

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.surface.conditioning import LEVELS, condition, fill_holes
 from pipeline.surface.heightfield import HeightField
 
@@ -184,7 +184,7 @@ def test_the_record_is_json() -> None:
 
 
 def test_nothing_but_holes_is_refused() -> None:
-    with pytest.raises(ScanError, match="every sample"):
+    with pytest.raises(InputError, match="every sample"):
         condition(HeightField(np.full((3, 3), np.nan), PITCH), "plane", None)
 
 

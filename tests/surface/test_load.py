@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.load import ScanRecord, load_scan
 from pipeline.surface.source import SurfaceSource
@@ -24,7 +24,7 @@ def load(path: Path, **keys: Any) -> tuple[HeightField, ScanRecord]:
 
 
 def told(path: Path, **keys: Any) -> str:
-    with pytest.raises(ScanError) as caught:
+    with pytest.raises(InputError) as caught:
         load(path, **keys)
     message = str(caught.value)
     assert "\n" not in message

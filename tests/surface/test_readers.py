@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.surface.readers import read_scan
 from pipeline.surface.readers.common import micrometres
 
@@ -30,7 +30,7 @@ def real(name: str) -> Path:
 
 def told(path: Path, channel: str | None = None) -> str:
     """The one line a fault is told in."""
-    with pytest.raises(ScanError) as caught:
+    with pytest.raises(InputError) as caught:
         read_scan(path, channel)
     message = str(caught.value)
     assert "\n" not in message

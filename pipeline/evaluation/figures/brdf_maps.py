@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.evaluation.figures import map_physics
 from pipeline.evaluation.figures.exact_maps import (
     NORMAL,
@@ -23,7 +24,6 @@ from pipeline.evaluation.figures.method_runs import OURS, PAPER, on_elaphe
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import pixels
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.surface import recipes
 from pipeline.surface.recipes.parameters import Blazed, CompactDisc

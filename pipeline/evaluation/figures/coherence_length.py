@@ -6,6 +6,7 @@ from math import sqrt
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
 from pipeline.evaluation.figures.exact_maps import NORMAL, SHOWN_RU, blazed_recipe, directions, views_of
@@ -14,7 +15,6 @@ from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import pixels
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField

@@ -21,7 +21,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 # heights in [0, 1] at places in periods
 Profile = Callable[[Array], Array]

@@ -5,6 +5,7 @@ from math import pi
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
@@ -14,7 +15,6 @@ from pipeline.evaluation.methods.method import Method
 from pipeline.evaluation.methods.polar_table import PolarTableMethod
 from pipeline.optics import geometry, gratings
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
 from pipeline.progress import Progress

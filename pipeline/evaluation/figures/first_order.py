@@ -10,13 +10,13 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import peaks
 from pipeline.evaluation.figures.figure import Surface
 from pipeline.evaluation.figures.peaks import Band, Plane, Power
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.method import Monochromatic
-from pipeline.optics.geometry import Array
 from pipeline.optics.grating_equation import period_um, viewing_angle
 from pipeline.optics.light import Light
 from pipeline.surface.heightfield import HeightField

@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.evaluation.figures.exact_maps import NORMAL, SHOWN_RU, STRICT_RU, directions, exact_maps, views_of
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.methods.paper_look_up import PUBLISHED_POWER, PUBLISHED_RESOLUTION
 from pipeline.evaluation.methods.paper_reference import TOLERANCE, taylor_stack
 from pipeline.optics.colour_error import delta_e, displayed_srgb, pixels
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map, table_evaluator
 from pipeline.tables.taylor import table as taylor

@@ -11,10 +11,10 @@ from importlib.resources import files
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Accuracy, Config
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.optics.scene import Direction, Scene

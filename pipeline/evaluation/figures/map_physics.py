@@ -5,12 +5,12 @@ from math import radians
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
 from pipeline.evaluation.figures.exact_maps import Light, directions
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.surface.recipes.parameters import Blazed
 from pipeline.tables.evaluate import Map

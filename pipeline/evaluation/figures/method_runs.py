@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 from pipeline.accuracy.checks import MAP_RADIUS
+from pipeline.arrays import Array
 from pipeline.evaluation.figures.exact_maps import NORMAL, directions, views_of
 from pipeline.evaluation.figures.figure import Bench, Surface
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.method import Method, prepare
 from pipeline.evaluation.speed.timing import timed
-from pipeline.optics.geometry import Array
 from pipeline.tables.evaluate import Map
 
 EXACT_NAME, OURS, PAPER = "exact", "polar table", "D14 look-up"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from pipeline.arrays import Array
 from pipeline.diffraction.reference import STEP_NM
 from pipeline.evaluation.figures.exact_maps import lit_views
 from pipeline.evaluation.figures.figure import Surface
@@ -16,7 +17,6 @@ from pipeline.evaluation.methods.dft_terms import FULL
 from pipeline.evaluation.methods.flss import Flss
 from pipeline.evaluation.methods.method import Method
 from pipeline.optics import brdf, geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.tables.evaluate import Map

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.evaluation.figures import method_traits as traits
 from pipeline.evaluation.figures.exact_maps import SHOWN_RU, STRICT_RU, views_of
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
@@ -14,7 +15,6 @@ from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, Method
 from pipeline.evaluation.methods.nmm import Nmm
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour_error import delta_e, pixels
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
 from pipeline.optics import geometry, gratings
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField

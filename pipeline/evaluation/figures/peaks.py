@@ -16,10 +16,10 @@ from math import cos, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window, sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.grating_equation import in_plane
 from pipeline.optics.light import Quadrature
 from pipeline.optics.material import Material

@@ -11,10 +11,10 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.evaluation.figures import coupled_wave
 from pipeline.evaluation.figures.coupled_wave import Profile
 from pipeline.optics import fresnel, geometry, gratings, validity
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 
 # aluminium at 633 nm (Rakic 1995); the default material's ior, its k a regularisation

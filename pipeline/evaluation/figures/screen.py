@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import DEFAULT_DELTA_E, Accuracy, Config
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
@@ -24,7 +25,6 @@ from pipeline.evaluation.methods.paper_look_up import PaperLookUp
 from pipeline.evaluation.methods.stam_gaussian import DiscWindow, StamGaussian
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import EXPOSURES_RU, delta_e
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField
 

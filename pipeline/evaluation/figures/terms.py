@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf
 
 from pipeline.accuracy.checks import MAP_RADIUS
+from pipeline.arrays import Array
 from pipeline.diffraction import expansion
 from pipeline.evaluation.figures import map_physics
 from pipeline.evaluation.figures.exact_maps import (
@@ -19,7 +20,6 @@ from pipeline.evaluation.figures.exact_maps import (
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
 from pipeline.evaluation.figures.truncated_series import STEP_NM, ChebyshevSeries, TaylorSeries
 from pipeline.optics.colour_error import delta_e, pixels
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import comb
 
 from kernels import diffraction
+from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Basis, Stack
 from pipeline.diffraction.reference import integrate
@@ -18,7 +19,6 @@ from pipeline.diffraction.upload import upload
 from pipeline.evaluation.figures.figure import Surface
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import brdf, geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.tables.taylor import table as taylor
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.evaluation.figures import coupled_wave
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
 from pipeline.evaluation.figures.scalar_errors import (
@@ -20,7 +21,6 @@ from pipeline.evaluation.figures.scalar_errors import (
     sweep,
 )
 from pipeline.optics import validity
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress
 from pipeline.surface import statistics
 

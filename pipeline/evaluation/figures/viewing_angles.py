@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.evaluation.figures import peaks
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
 from pipeline.evaluation.figures.first_order import (
@@ -24,7 +25,6 @@ from pipeline.evaluation.figures.first_order import (
     variants,
     walk_of,
 )
-from pipeline.optics.geometry import Array
 from pipeline.optics.grating_equation import viewing_angle
 from pipeline.progress import Progress
 

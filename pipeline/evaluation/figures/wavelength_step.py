@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.diffraction.reference import STEP_NM, integrate
 from pipeline.evaluation.figures.exact_maps import (
     NORMAL,
@@ -19,7 +20,6 @@ from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Su
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import delta_e, pixels
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map

@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from scipy.fft import ifft2
 
 from kernels import neighbourhood
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import expansion
 from pipeline.diffraction.device import require_device
 from pipeline.optics.coherence import reach_sigmas, sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 
 # of exp(i k w h) at the worst sample: what is left out of the Taylor series where no number of terms is given

@@ -1,8 +1,8 @@
 """The exact reference as a method: the sum over samples at every nanometre, which all others are held against."""
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 
 

@@ -13,10 +13,10 @@ where s passes a whole number: on 65 um = 4 sigma by up to 0.29 of a neighbour. 
 [S14] 1.3.2 mean the whole width of the window instead, then 3 x 3, as wide as that, is what it asks for.
 """
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, integrated
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 
 

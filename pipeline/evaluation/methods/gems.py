@@ -6,10 +6,10 @@ at the exposure that the config renders with; under 1 RU they are that much dark
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.errors import ConfigError
 from pipeline.optics import colour_data
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import dominant_periods
 

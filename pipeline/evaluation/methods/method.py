@@ -7,10 +7,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import integrate
 from pipeline.optics import brdf, geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature, trapezoid
 from pipeline.surface.heightfield import HeightField
 

@@ -21,11 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import integrate
 from pipeline.errors import ConfigError
 from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach, tiles
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import FINE_STEP_NM, trapezoid
 from pipeline.surface.heightfield import HeightField
 

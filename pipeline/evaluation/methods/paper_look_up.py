@@ -1,9 +1,9 @@
 """The look-up shader of [D14] sec. 5: tables I_p(u, v) of the spectrally integrated Taylor series, bilinear."""
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.methods.paper_reference import TOLERANCE, taylor_stack
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor import table as taylor

@@ -4,12 +4,12 @@ from math import exp
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.reference import in_band
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, integrated
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature, trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import table as taylor

@@ -4,11 +4,11 @@ from functools import cached_property
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.dft_stack import crop_to_window
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import in_band
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.planning import plan

@@ -21,10 +21,10 @@ from math import ceil, pi
 
 from scipy.special import diric
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, integrated
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 
 # [D14] 4.2: coherent light spans 4 sigma

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, integrate
 from pipeline.errors import ConfigError
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import dominant_periods

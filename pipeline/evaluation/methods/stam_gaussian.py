@@ -25,11 +25,11 @@ from scipy import fft
 from scipy.sparse import csr_array
 from scipy.special import ive, j1
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import expansion
 from pipeline.evaluation.methods.method import integrated
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 
 # [D14] sec. 6.3: the circular aperture of 100 um before the laser

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from pipeline.accuracy.plots import png
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 # told apart by people who confuse red and green as well (Okabe and Ito 2008)
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

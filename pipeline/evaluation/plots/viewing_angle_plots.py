@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm, PowerNorm
 from matplotlib.figure import Figure
 
 from pipeline.accuracy.plots import png
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 _DECADES = 7.0
 _GAMMA = 0.6

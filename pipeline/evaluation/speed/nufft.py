@@ -26,11 +26,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.evaluation.speed import nufft_modes
 from pipeline.evaluation.speed.nufft_modes import Complex, Modes
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of
-from pipeline.optics.geometry import Array
 
 _TOLERANCE = 1e-5
 _UPSAMPLING = (1.25, 2.0)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels import device
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.evaluation.speed import plain, work
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.timing import best_of, timed
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import grid

@@ -6,9 +6,9 @@ Numpy does the sums over coefficients and terms. Also the second way to the kern
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature
 
 

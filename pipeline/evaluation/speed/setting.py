@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.special import jv
 
 from kernels.spectral_operator import LinePoints, RingQuadratures, w_max, w_nodes
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack, crop_to_window
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.planning import plan

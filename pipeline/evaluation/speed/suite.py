@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.accuracy.checks import MAP_SIZE, RelativeError, relative_error
+from pipeline.arrays import Array
 from pipeline.bundle import polar_storage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.config.models import Config
@@ -19,7 +20,6 @@ from pipeline.evaluation.speed.timing import best_of, timed
 from pipeline.evaluation.speed.transforms import Transforms
 from pipeline.evaluation.speed.truth import MapTruth
 from pipeline.optics.colour_error import ColourError
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar.compression import compress, most_textures, whole

@@ -5,12 +5,12 @@ from math import pi
 import numpy as np
 
 from kernels.polar_spectrum import LANES
+from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion, power_spectrum
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.stability.cell import LAMBDA_MIN_NM, SEED, Cell
 from pipeline.evaluation.stability.reading import MOST_WORK, Reading, readings
 from pipeline.evaluation.stability.series_way import CUT
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.taylor import table as taylor

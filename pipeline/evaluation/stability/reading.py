@@ -6,10 +6,10 @@ from math import sqrt
 
 import numpy as np
 
+from pipeline.arrays import Array
 from pipeline.diffraction.reference import power_direct
 from pipeline.evaluation.stability.cell import LAMBDA_MAX_NM, LAMBDA_MIN_NM, SEED, Cell
 from pipeline.optics import geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
 from pipeline.surface.heightfield import HeightField
 

@@ -5,11 +5,11 @@ from math import pi
 import numpy as np
 from scipy.special import jv
 
+from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.evaluation.stability.cell import LAMBDA_MIN_NM, Cell
 from pipeline.evaluation.stability.reading import Reading, readings
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.surface.heightfield import HeightField
 
 # terms left out and the window's cut, in amplitude: nothing beside float32's rounding

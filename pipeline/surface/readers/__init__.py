@@ -23,7 +23,7 @@ _READERS = {
 def read_scan(path: Path, channel: str | None) -> Scan:
     """One channel of a scan file; `channel` None takes the height channel.
 
-    The content decides the format, not the suffix. Raises ScanError with one line where the file cannot
+    The content decides the format, not the suffix. Raises InputError with one line where the file cannot
     be opened, is of no known format, is damaged, or does not hold the channel.
     """
     key = sniff(path)

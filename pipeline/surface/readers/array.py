@@ -13,7 +13,7 @@ _CHANNEL = "array"
 
 
 def read_npy(path: Path, channel: str | None) -> Scan:
-    """The one array of a .npy file. Raises ScanError unless it is 2-D and of real numbers."""
+    """The one array of a .npy file. Raises InputError unless it is 2-D and of real numbers."""
     pick_channel(path.name, [_CHANNEL], channel)
     with third_party(path.name, "a NumPy .npy file", "numpy"):
         # mapped, so that a shape which is refused costs no memory

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 
 MIN_SAMPLES = 8
 MAX_SAMPLES = 8192
@@ -39,14 +39,14 @@ def one_line(text: str, limit: int = 200) -> str:
     return flat if len(flat) <= limit else f"{flat[: limit - 3]}..."
 
 
-def fault(file: str, expected: str, found: str, way_out: str) -> ScanError:
+def fault(file: str, expected: str, found: str, way_out: str) -> InputError:
     """The one shape of a reader's error: file, what was expected, what was found, the way out."""
-    return ScanError(f"{file}: expected {expected}, found {found}; {way_out}")
+    return InputError(f"{file}: expected {expected}, found {found}; {way_out}")
 
 
 @contextmanager
 def third_party(file: str, expected: str, library: str) -> Iterator[None]:
-    """Runs foreign code: no warning leaves it, and any exception becomes a ScanError of one line.
+    """Runs foreign code: no warning leaves it, and any exception becomes a InputError of one line.
 
     `expected` is the format in words. Readers of instrument formats raise whatever a damaged byte leads
     to (struct.error, KeyError, MemoryError, ...), hence the bare Exception.
@@ -55,7 +55,7 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except ScanError:
+    except InputError:
         raise
     except ImportError as error:
         missing = error.name or library
@@ -84,7 +84,7 @@ def library_version(library: str) -> str:
 
 
 def check_shape(file: str, shape: Sequence[int]) -> None:
-    """Raises ScanError unless `shape` is (ny, nx) with MIN_SAMPLES..MAX_SAMPLES along both axes.
+    """Raises InputError unless `shape` is (ny, nx) with MIN_SAMPLES..MAX_SAMPLES along both axes.
 
     Readers call it before they decode, so that a header's claim costs no memory.
     """
@@ -120,7 +120,7 @@ def unique_names(names: Sequence[str]) -> list[str]:
 def pick_channel(file: str, names: Sequence[str], wanted: str | None) -> int:
     """Index of the channel to read: the one wanted, else the first that a height is usually called.
 
-    Traces (forward) come before retraces. Raises ScanError where nothing or no single channel fits.
+    Traces (forward) come before retraces. Raises InputError where nothing or no single channel fits.
     """
     listed = ", ".join(repr(name) for name in names)
     if not names:

@@ -26,7 +26,7 @@ _PHOTOMETRIC, _WHITE_IS_ZERO = 262, 0
 def read(path: Path, channel: str | None) -> Scan:
     """The codes of a grey image, or of a colour image whose channels agree.
 
-    full_code is 255 or 65535, None for floating-point TIFFs. Raises ScanError for what is no single
+    full_code is 255 or 65535, None for floating-point TIFFs. Raises InputError for what is no single
     opaque grey page.
     """
     pick_channel(path.name, [_CHANNEL], channel)

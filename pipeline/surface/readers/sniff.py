@@ -4,7 +4,7 @@ import codecs
 import struct
 from pathlib import Path
 
-from pipeline.errors import ScanError
+from pipeline.errors import InputError
 from pipeline.surface.readers.common import fault, one_line
 
 # first bytes -> format key of readers.read_scan
@@ -50,7 +50,7 @@ _HEAD_BYTES = 4096
 def sniff(path: Path) -> str:
     """The format key of a file: "image", "text", "npy", "npz", "gwyddion", "nanonis" or one of spm.FORMATS.
 
-    Raises ScanError where the file cannot be opened, is empty, or is nothing that can be read.
+    Raises InputError where the file cannot be opened, is empty, or is nothing that can be read.
     """
     head = _head(path)
     for magic, found, way_out in _REFUSED:
@@ -83,7 +83,7 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _unknown(path: Path, head: bytes) -> ScanError:
+def _unknown(path: Path, head: bytes) -> InputError:
     found = f"unknown content (it begins with {head[:8].hex(' ')})"
     if path.suffix.lower() in _BINARY_SUFFIXES:
         expected = f"a {path.suffix.lower()} file, as the suffix says"

@@ -34,7 +34,7 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
 def read(path: Path, key: str, channel: str | None) -> Scan:
-    """One height channel of a file in FORMATS[key]. Raises ScanError where there is none, or damage."""
+    """One height channel of a file in FORMATS[key]. Raises InputError where there is none, or damage."""
     with third_party(path.name, f"a {FORMATS[key]} file", _LIBRARY):
         from SurfaceTopography.IO import open_topography
 

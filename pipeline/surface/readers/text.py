@@ -49,7 +49,7 @@ def read(path: Path, channel: str | None) -> Scan:
     """A matrix, a flat list with the image's width in the header, or complete x y z triples.
 
     Matrices and lists are flipped, as their first row is the top; triples say where they lie. Raises
-    ScanError for anything but numbers, uneven rows, and a single column or row without a width.
+    InputError for anything but numbers, uneven rows, and a single column or row without a width.
     """
     lines = _split(path, _decode(path.read_bytes()))
     separator, rows = _separated(path, lines.rows)

@@ -14,7 +14,7 @@ _EVEN = 0.01
 def heights(file: str, table: NDArray[np.float64]) -> NDArray[np.float64]:
     """Heights (ny, nx), y up with the coordinate, NaN where a point is missing; `table` is (n, 3).
 
-    The unit of x and y is not stated in such files, so no pitch comes of them. Raises ScanError where
+    The unit of x and y is not stated in such files, so no pitch comes of them. Raises InputError where
     the points do not lie on one regular grid.
     """
     column, nx = _grid_lines(file, "x", table[:, 0])

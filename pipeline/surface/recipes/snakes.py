@@ -5,15 +5,13 @@ is exactly periodic; shapes were matched by eye and by power spectrum to AFM sca
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Elaphe, Xenopeltis
 from pipeline.surface.recipes.patch import Axis, Patch, generator, patch_of
 from pipeline.surface.recipes.random import lowpass, smooth_noise
-
-Array = NDArray[np.float64]
 
 # rms blur of the probe's finite tip, um; it also keeps the steps within the samples' band
 _TIP_UM = 0.04

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from pipeline.arrays import Array
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.geometry import Array
 
 _LEAST_STRETCH = 0.3
 _CHANCE = 0.04  # the harmonic that speckle of no direction has

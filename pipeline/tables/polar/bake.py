@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from kernels.spectral_operator import RingQuadratures
+from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.geometry import Array
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import quadrature

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
+from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.optics import geometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Scene
 from pipeline.tables.polar.table import PolarTable, w_position

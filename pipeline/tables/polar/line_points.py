@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kernels.programs import MOST_RINGS, ORDER
 from kernels.spectral_operator import LinePoints, w_max
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 from pipeline.tables.polar.quadrature import RingQuadratures
 
 # how far a step may carry s, in mean distances of E's nodes in s: E cannot turn faster than they follow

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.spectral_operator import RingQuadratures as RingQuadratures
+from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import FINE_STEP_NM, Quadrature
 
 _STEPS_NM = (20.0, 10.0, 5.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)

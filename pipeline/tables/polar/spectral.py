@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.spectral_operator import chebyshev
+from pipeline.arrays import Array
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
-from pipeline.optics.geometry import Array
 
 _ORDER = 8  # radii about each; four leave ten times the error
 _AT_ONCE = 2048

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import spectral_operator
+from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
 from pipeline.optics.brdf import grey
-from pipeline.optics.geometry import Array
 from pipeline.tables.polar import line_points
 from pipeline.tables.polar.quadrature import RingQuadratures
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from kernels import cubic_spline
 from kernels.spectral_operator import RingQuadratures
+from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry, geometry_factor, grey
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.spectral_integral import Reflectance

@@ -6,7 +6,7 @@ the centre of texel i: texture coordinate (i + 1/2) / n.
 
 import numpy as np
 
-from pipeline.optics.geometry import Array
+from pipeline.arrays import Array
 
 U_MAX = 2.0
 

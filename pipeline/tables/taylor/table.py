@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import diffraction
+from pipeline.arrays import Array
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.upload import upload
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Quadrature
 from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import power_direct, xyz_direct
 from pipeline.evaluation.methods.catalogue import METHODS
@@ -12,7 +13,6 @@ from pipeline.evaluation.methods.polar_table import PolarTableMethod
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour_error import delta_e
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
@@ -11,7 +12,6 @@ from pipeline.evaluation.methods.paper_look_up import PaperLookUp
 from pipeline.evaluation.methods.paper_reference import PaperReference
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence, sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import ConfigError
@@ -17,7 +18,6 @@ from pipeline.evaluation.methods.stam_bumps import (
 )
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
-from pipeline.optics.geometry import Array
 from pipeline.optics.light import LaserLine, Light
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make

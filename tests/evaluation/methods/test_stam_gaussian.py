@@ -5,6 +5,7 @@ from math import factorial
 import numpy as np
 import pytest
 
+from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import power_direct
 from pipeline.evaluation.methods.method import Monochromatic
@@ -17,7 +18,6 @@ from pipeline.evaluation.methods.stam_gaussian import (
 )
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence, folded_window, sigma_f
-from pipeline.optics.geometry import Array
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Mirror
