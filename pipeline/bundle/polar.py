@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from pipeline.bundle import exr, polar_readme, polar_storage
+from pipeline.bundle import exr, polar_storage
 from pipeline.bundle.manifest import CertificateEntry, PolarGrid, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
@@ -43,8 +43,19 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         plan={key: inputs["power_spectrum"].summary.get(key) for key in _PLANNED},
         certificate=CertificateEntry.model_validate(inputs["table"].summary["certificate"]),
         loss=loss,
-        files=polar_readme.files(entry, stored.textures.count, config.publish.precision),
-        shader=polar_readme.shader(entry, stored.textures.count),
+        constants={
+            "RINGS": entry.height,
+            "AZIMUTHS": entry.width,
+            "TEXTURES": stored.textures.count,
+            "TERMS": entry.w_terms,
+            "LOW_RANK": entry.basis is not None,
+            "R0": entry.r0,
+            "STEP": entry.step,
+            "AXIS": entry.axis_rad,
+            "STRETCH": entry.stretch,
+            "ENVELOPE_RADIUS": entry.envelope_radius,
+            "ENVELOPE_EXPONENT": entry.envelope_exponent,
+        },
     )
 
 

@@ -18,7 +18,7 @@ class Prepared:
     """What one layout brings to a bundle.
 
     holds: what the tables' numbers are called, and `conventions` what they mean. images: made one by one as they are
-    asked for, `count` of them. files, shader: the README's line about the tables and its section for shader authors.
+    asked for, `count` of them. constants: those of the layout's shader, kernels/shaders/.
     """
 
     holds: str
@@ -30,5 +30,4 @@ class Prepared:
     plan: dict[str, Any]
     certificate: CertificateEntry | None
     loss: StorageLoss | None
-    files: str
-    shader: str
+    constants: dict[str, bool | int | float]

@@ -126,7 +126,7 @@ def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progres
         provenance=entries.provenance(config, {name: artifact.key for name, artifact in inputs.items()}),
     )
     _write_text(folder / MANIFEST, page.text())
-    _write_text(folder / README, readme.text(page, table.files, table.shader))
+    _write_text(folder / README, readme.text(page, table.constants))
     source = files("pipeline.bundle").joinpath(EVALUATE).read_text(encoding="utf-8")
     _write_text(folder / EVALUATE, source)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from pipeline.bundle import exr, taylor_half, taylor_readme
+from pipeline.bundle import exr, taylor_half
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
@@ -45,8 +45,7 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         plan={key: inputs["stack"].summary.get(key) for key in _PREDICTED},
         certificate=None,
         loss=loss,
-        files=taylor_readme.files(entry, len(scale), config.publish.precision),
-        shader=taylor_readme.shader(entry, len(scale)),
+        constants={"POWERS": len(scale), "N": float(entry.width), "A": entry.power},
     )
 
 

@@ -89,8 +89,10 @@ def test_the_readme_shows_the_certificate_and_its_own_numbers(bundle: Path) -> N
     text, told = (bundle / "README.md").read_text(encoding="utf-8"), manifest_of(bundle)
     assert told.certificate is not None
     assert f"keeps {told.certificate.measured:.3g}" in text
-    assert "const int RINGS = 40, AZIMUTHS = 192, TEXTURES = 9, TERMS = 12;" in text
-    assert f"R0 = {grid_of(told).r0!r}, STEP = {grid_of(told).step!r}" in text
+    for name, value in (("RINGS", 40), ("AZIMUTHS", 192), ("TEXTURES", 9), ("TERMS", 12)):
+        assert f"const int {name} = {value};" in text
+    for name, number in (("R0", grid_of(told).r0), ("STEP", grid_of(told).step)):
+        assert f"const float {name} = {number!r};" in text
 
 
 def test_a_standing_bundle_is_found_again(bake: Baker, bundle: Path) -> None:
