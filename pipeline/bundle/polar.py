@@ -3,9 +3,11 @@
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from pydantic import TypeAdapter
 
+from pipeline.accuracy.certificate import Certificate
 from pipeline.bundle import exr, polar_storage
-from pipeline.bundle.manifest import CertificateEntry, PolarGrid, PolarImage
+from pipeline.bundle.manifest import PolarGrid, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
@@ -41,7 +43,7 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         images=_images(config, stored),
         count=stored.textures.count,
         plan={key: inputs["power_spectrum"].summary.get(key) for key in _PLANNED},
-        certificate=CertificateEntry.model_validate(inputs["table"].summary["certificate"]),
+        certificate=TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"]),
         loss=loss,
         constants={
             "RINGS": entry.height,

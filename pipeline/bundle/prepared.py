@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.bundle.manifest import CertificateEntry, Grid, StorageLoss, TableImage
+from pipeline.accuracy.certificate import Certificate
+from pipeline.bundle.manifest import Grid, StorageLoss, TableImage
 
 # an image's entry in the manifest, and its pixels (rows, columns, RGBA)
 Texture = tuple[TableImage, NDArray[np.floating[Any]]]
@@ -28,6 +29,6 @@ class Prepared:
     images: Iterable[Texture]
     count: int
     plan: dict[str, Any]
-    certificate: CertificateEntry | None
+    certificate: Certificate | None
     loss: StorageLoss | None
     constants: dict[str, bool | int | float]
