@@ -6,11 +6,12 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
-from pipeline.bundle import exr, polar_storage
+from pipeline.bundle import polar_storage
 from pipeline.bundle.manifest import PolarGrid, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
+from pipeline.report import images
 from pipeline.stages import polar_table, surface
 from pipeline.store.store import Artifact
 from pipeline.tables.polar.compression import CHANNELS, Textures
@@ -92,7 +93,7 @@ def _images(config: Config, stored: Stored) -> Iterator[Texture]:
             file=f"tables/T_{q:02d}.exr",
             width=pixels.shape[1],
             height=pixels.shape[0],
-            channels=sorted(exr.CHANNELS),
+            channels=sorted(images.RGBA),
             pixel_type=config.publish.precision,
             index=q,
             scale=stored.scale[outputs].tolist(),

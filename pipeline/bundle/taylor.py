@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 
-from pipeline.bundle import exr, taylor_half
+from pipeline.bundle import taylor_half
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
 from pipeline.optics.geometry import Array
+from pipeline.report import images
 from pipeline.stages import taylor_table
 from pipeline.store.store import Artifact
 from pipeline.tables.taylor import grid
@@ -59,7 +60,7 @@ def _images(config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss |
             file=f"tables/I_{p:02d}.exr",
             width=plane.shape[1],
             height=plane.shape[0],
-            channels=sorted(exr.CHANNELS),
+            channels=sorted(images.RGBA),
             pixel_type=stored,
             index=p,
             scale=float(scale[p]),

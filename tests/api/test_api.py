@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipeline import Bundle, bake, load_scan
-from pipeline.bundle.evaluate import Bundle as Evaluator
+from pipeline.bundle.evaluator import Bundle as Evaluator
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, BakeError, ConfigError, DamagedError, ScanError, StorageError
 from pipeline.optics.geometry import direction

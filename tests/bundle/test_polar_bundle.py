@@ -12,9 +12,8 @@ from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import polar_storage
 from pipeline.bundle.manifest import Manifest, PolarGrid, PolarLoss
-from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.publish import publish, published
-from pipeline.bundle.verify import verify
+from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError, ConfigError
 from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
@@ -124,7 +123,7 @@ def test_a_bundle_errs_as_it_says(
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
     table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
-    evaluate = bundle_evaluator(folder)
+    evaluate = open_bundle(folder).xyz
     mirror = wi * [-1.0, -1.0, 1.0]
     for views, error in ((wr, loss_of(told).added), (mirror, loss_of(told).added_in_mirror)):
         found = delta_e(evaluate(wi, views), table(wi, views), error.exposure_ru)
