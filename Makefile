@@ -51,6 +51,15 @@ install-opencl:
 		exit 5; \
 	fi
 
+# Tests compile the shaders that bundles show; they skip that, and say so, where the compiler is absent.
+.PHONY: glslang
+glslang:
+	@command -v glslangValidator >/dev/null || { \
+		test "$$(id -u)" = 0 && command -v apt-get >/dev/null && \
+		echo "no glslangValidator: installing Debian's glslang-tools" >&2 && \
+		apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq glslang-tools >/dev/null; \
+	} || echo "no glslangValidator: shaders are not compiled by the tests. See: apt-get install glslang-tools" >&2
+
 bake: setup
 	$(BAKE) run configs/elaphe.toml --out $(OUT)
 
@@ -79,10 +88,10 @@ format: $(VENV)/ready
 	$(VENV)/bin/ruff check --fix .
 	$(VENV)/bin/ruff format .
 
-test: setup lint
+test: setup glslang lint
 	$(VENV)/bin/python -m pytest
 
-test-fast: setup
+test-fast: setup glslang
 	$(VENV)/bin/python -m pytest -m "not slow"
 
 # PoCL builds for a processor without AVX-512 on one that has it, into a kernel cache of its own. Debian's build of PoCL

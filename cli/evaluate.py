@@ -10,7 +10,6 @@ from cli import console, sources
 
 # as configs have them
 _SHORTEST_NM, _LONGEST_NM = 360.0, 830.0
-_COLUMNS = ("theta_i", "phi_i", "theta_r", "phi_r")
 
 
 @click.command("eval")
@@ -66,44 +65,25 @@ def _read_wavelengths(text: str) -> list[float]:
     return found
 
 
-def _read_directions(path: Path) -> list[list[float]]:
-    """Rows of four angles in degrees; a header line may lead. Faults name the line."""
+def _read_directions(path: Path) -> Any:
+    """Rows of four angles in degrees (directions, 4), as a bundle's evaluate.py reads them. Faults name the line."""
+    from pipeline.bundle.evaluator import read_directions
     from pipeline.errors import InputError
 
     try:
         text = sys.stdin.read().removeprefix("\ufeff") if str(path) == "-" else path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text ({error})") from None
-    rows: list[list[float]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        content = line.split("#")[0].strip()
-        if not content or (not rows and [c.strip() for c in content.split(",")] == list(_COLUMNS)):
-            continue
-        rows.append(_read_row(content, f"{path}: line {number}"))
-    if not rows:
-        raise InputError(f"{path}: expected rows of {','.join(_COLUMNS)} in degrees, got none")
-    return rows
-
-
-def _read_row(content: str, place: str) -> list[float]:
-    from pipeline.errors import InputError
-
     try:
-        row = [float(cell) for cell in content.split(",")]
-    except ValueError:
-        row = []
-    if len(row) != 4:
-        raise InputError(f"{place}: expected four numbers {','.join(_COLUMNS)}, got {content!r}")
-    # NaN fails every comparison
-    if not (0 <= row[0] < 90 and 0 <= row[2] < 90 and abs(row[1]) < 1e6 and abs(row[3]) < 1e6):
-        raise InputError(f"{place}: expected theta in [0, 90) and finite phi, degrees, got {content!r}")
-    return row
+        return read_directions(text)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
-def _unit_vectors(rows: list[list[float]]) -> tuple[Any, Any]:
+def _unit_vectors(rows: Any) -> tuple[Any, Any]:
     import numpy as np
 
     from pipeline.optics.geometry import direction
 
-    angles = np.radians(np.array(rows))
+    angles = np.radians(rows)
     return direction(angles[:, 0], angles[:, 1]), direction(angles[:, 2], angles[:, 3])

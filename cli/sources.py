@@ -23,9 +23,9 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
     if source.is_dir():
         if exact:
             raise click.UsageError("--exact needs a config: a bundle holds tables, not the surface")
-        from pipeline.bundle.open import bundle_evaluator
+        from pipeline.bundle.verify import open_bundle
 
-        return bundle_evaluator(source)
+        return open_bundle(source).xyz
     return config_evaluator(load(source), exact, store_root, progress)
 
 

@@ -363,8 +363,8 @@ def shared(array: np.ndarray) -> Any:
 
 
 def lent(array: np.ndarray) -> Any:
-    """A device buffer to read from: the array's own memory where that begins on a cache line, else a copy."""
-    return shared(array) if array.ctypes.data % _LINE == 0 else upload(array)
+    """A device buffer to read from: the array's own memory if it is one block from a cache line on, else a copy."""
+    return shared(array) if array.flags.c_contiguous and array.ctypes.data % _LINE == 0 else upload(array)
 
 
 def settle(buffer: Any, array: np.ndarray) -> np.ndarray:

@@ -125,7 +125,7 @@ class Bundle:
 
         Raises DamagedError where it is not what was published.
         """
-        from pipeline.bundle.open import open_bundle
+        from pipeline.bundle.verify import open_bundle
 
         self.path = Path(path)
         self._bundle = open_bundle(self.path)

@@ -8,7 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from pipeline.accuracy.certificate import Certificate
+from pipeline.accuracy.checks import RelativeError
 from pipeline.bundle.material import MaterialEntry
+from pipeline.optics.colour_error import ColourError
 from pipeline.validated import Validated
 
 MANIFEST = "manifest.json"
@@ -131,45 +134,6 @@ Grid = Annotated[TaylorGrid | PolarGrid, Field(discriminator="layout")]
 # --- errors --------------------------------------------------------------------------------------------
 
 
-class RelativeErrors(Validated):
-    """Of |value - reference| / max(reference, floor)."""
-
-    median: float
-    percentile_99: float
-    maximum: float
-
-
-class ColourErrors(Validated):
-    """CIELAB differences at an exposure."""
-
-    exposure_ru: float
-    mean: float
-    percentile_99: float
-    maximum: float
-
-
-class RandomErrors(Validated):
-    """Against the exact sum on random directions: Y of |P|^2, and colours."""
-
-    directions: int
-    power: RelativeErrors
-    colour: list[ColourErrors]
-
-
-class CertificateEntry(Validated):
-    """What the table was planned for, and what it keeps on directions that its planning never saw.
-
-    measured: the mean CIELAB error at exposure_ru, within delta_e. reference: the exact sum's fast route against
-    the plain one.
-    """
-
-    delta_e: float
-    exposure_ru: float
-    measured: float
-    random: RandomErrors
-    reference: RelativeErrors
-
-
 class TaylorLoss(Validated):
     """What storing the table in half floats adds, against the float table.
 
@@ -180,7 +144,7 @@ class TaylorLoss(Validated):
 
     layout: Literal["taylor"]
     directions: int
-    relative_error_of_y: dict[str, RelativeErrors]
+    relative_error_of_y: dict[str, RelativeError]
     floor: float
     exposure_ru: float
     largest_delta_e: float
@@ -199,9 +163,9 @@ class PolarLoss(Validated):
     directions: int
     textures: int
     most_textures: int
-    error: ColourErrors
-    added: ColourErrors
-    added_in_mirror: ColourErrors
+    error: ColourError
+    added: ColourError
+    added_in_mirror: ColourError
     subnormal_share: float | None
 
 
@@ -293,7 +257,7 @@ class Manifest(Validated):
     coverage: Coverage
     domain: Domain
     plan: dict[str, Any]
-    certificate: CertificateEntry | None
+    certificate: Certificate | None
     measured_error: dict[str, Any]
     storage_loss: StorageLoss | None
     surface: dict[str, Any]

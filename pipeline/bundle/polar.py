@@ -3,12 +3,15 @@
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from pydantic import TypeAdapter
 
-from pipeline.bundle import exr, polar_readme, polar_storage
-from pipeline.bundle.manifest import CertificateEntry, PolarGrid, PolarImage
+from pipeline.accuracy.certificate import Certificate
+from pipeline.bundle import polar_storage
+from pipeline.bundle.manifest import PolarGrid, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
+from pipeline.report import images
 from pipeline.stages import polar_table, surface
 from pipeline.store.store import Artifact
 from pipeline.tables.polar.compression import CHANNELS, Textures
@@ -41,10 +44,21 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         images=_images(config, stored),
         count=stored.textures.count,
         plan={key: inputs["power_spectrum"].summary.get(key) for key in _PLANNED},
-        certificate=CertificateEntry.model_validate(inputs["table"].summary["certificate"]),
+        certificate=TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"]),
         loss=loss,
-        files=polar_readme.files(entry, stored.textures.count, config.publish.precision),
-        shader=polar_readme.shader(entry, stored.textures.count),
+        constants={
+            "RINGS": entry.height,
+            "AZIMUTHS": entry.width,
+            "TEXTURES": stored.textures.count,
+            "TERMS": entry.w_terms,
+            "LOW_RANK": entry.basis is not None,
+            "R0": entry.r0,
+            "STEP": entry.step,
+            "AXIS": entry.axis_rad,
+            "STRETCH": entry.stretch,
+            "ENVELOPE_RADIUS": entry.envelope_radius,
+            "ENVELOPE_EXPONENT": entry.envelope_exponent,
+        },
     )
 
 
@@ -79,7 +93,7 @@ def _images(config: Config, stored: Stored) -> Iterator[Texture]:
             file=f"tables/T_{q:02d}.exr",
             width=pixels.shape[1],
             height=pixels.shape[0],
-            channels=sorted(exr.CHANNELS),
+            channels=sorted(images.RGBA),
             pixel_type=config.publish.precision,
             index=q,
             scale=stored.scale[outputs].tolist(),

@@ -11,11 +11,11 @@ from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.accuracy.exact import reference_of
 from pipeline.arrays import Array
 from pipeline.bundle import half
-from pipeline.bundle.manifest import ColourErrors, PolarLoss
+from pipeline.bundle.manifest import PolarLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
@@ -117,9 +117,9 @@ class _Measure:
         g = textures.envelope.at(np.hypot(uv[:, 0], uv[:, 1]))
         return g[:, None] * table_evaluator(textures.table(), self._config.radiometry)(self._wi, views)
 
-    def _errors(self, found: Array, truth: Array, exposure_ru: float) -> ColourErrors:
+    def _errors(self, found: Array, truth: Array, exposure_ru: float) -> ColourError:
         error = delta_e(found / self._unit, truth / self._unit, exposure_ru)
-        return ColourErrors(
+        return ColourError(
             exposure_ru=exposure_ru,
             mean=float(error.mean()),
             percentile_99=float(np.percentile(error, 99)),

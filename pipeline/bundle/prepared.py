@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.bundle.manifest import CertificateEntry, Grid, StorageLoss, TableImage
+from pipeline.accuracy.certificate import Certificate
+from pipeline.bundle.manifest import Grid, StorageLoss, TableImage
 
 # an image's entry in the manifest, and its pixels (rows, columns, RGBA)
 Texture = tuple[TableImage, NDArray[np.floating[Any]]]
@@ -18,7 +19,7 @@ class Prepared:
     """What one layout brings to a bundle.
 
     holds: what the tables' numbers are called, and `conventions` what they mean. images: made one by one as they are
-    asked for, `count` of them. files, shader: the README's line about the tables and its section for shader authors.
+    asked for, `count` of them. constants: those of the layout's shader, kernels/shaders/.
     """
 
     holds: str
@@ -28,7 +29,6 @@ class Prepared:
     images: Iterable[Texture]
     count: int
     plan: dict[str, Any]
-    certificate: CertificateEntry | None
+    certificate: Certificate | None
     loss: StorageLoss | None
-    files: str
-    shader: str
+    constants: dict[str, bool | int | float]

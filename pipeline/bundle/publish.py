@@ -7,18 +7,19 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from pipeline.bundle import checksums, entries, exr, layouts, material, readme
+from pipeline.bundle import checksums, entries, layouts, material, readme
 from pipeline.bundle.manifest import MANIFEST, SCHEMA_VERSION, Manifest, MapImage, TableImage
 from pipeline.bundle.prepared import Prepared
 from pipeline.bundle.verify import summary, verify
 from pipeline.config.models import Config
 from pipeline.errors import DamagedError
 from pipeline.progress import Progress, silent
+from pipeline.report import images
 from pipeline.stages.validate import REPORT
 from pipeline.store import scratch
 from pipeline.store.store import Artifact, writing
 
-EVALUATE, README = "evaluate.py", "README.md"
+EVALUATOR, README = "evaluate.py", "README.md"
 TABLES, MAPS = "tables", "maps"
 _BESIDE = ".publishing-"
 # as pipeline.report.images.write_xyz names them
@@ -126,9 +127,9 @@ def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progres
         provenance=entries.provenance(config, {name: artifact.key for name, artifact in inputs.items()}),
     )
     _write_text(folder / MANIFEST, page.text())
-    _write_text(folder / README, readme.text(page, table.files, table.shader))
-    source = files("pipeline.bundle").joinpath(EVALUATE).read_text(encoding="utf-8")
-    _write_text(folder / EVALUATE, source)
+    _write_text(folder / README, readme.text(page, table.constants))
+    source = files("pipeline.bundle").joinpath("evaluator.py").read_text(encoding="utf-8")
+    _write_text(folder / EVALUATOR, source)
 
 
 def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[TableImage]:
@@ -136,7 +137,7 @@ def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[Tab
     (folder / TABLES).mkdir()
     written = []
     for image, pixels in table.images:
-        exr.write_rgba(folder / image.file, pixels)
+        images.write_rgba(folder / image.file, pixels)
         written.append(image)
         progress("publish", 0.9 * len(written) / table.count)
     return written

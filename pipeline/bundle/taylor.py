@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Mapping
 
 from pipeline.arrays import Array
-from pipeline.bundle import exr, taylor_half, taylor_readme
+from pipeline.bundle import taylor_half
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
+from pipeline.report import images
 from pipeline.stages import taylor_table
 from pipeline.store.store import Artifact
 from pipeline.tables.taylor import grid
@@ -45,8 +46,7 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         plan={key: inputs["stack"].summary.get(key) for key in _PREDICTED},
         certificate=None,
         loss=loss,
-        files=taylor_readme.files(entry, len(scale), config.publish.precision),
-        shader=taylor_readme.shader(entry, len(scale)),
+        constants={"POWERS": len(scale), "N": float(entry.width), "A": entry.power},
     )
 
 
@@ -60,7 +60,7 @@ def _images(config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss |
             file=f"tables/I_{p:02d}.exr",
             width=plane.shape[1],
             height=plane.shape[0],
-            channels=sorted(exr.CHANNELS),
+            channels=sorted(images.RGBA),
             pixel_type=stored,
             index=p,
             scale=float(scale[p]),

@@ -1,7 +1,7 @@
 """What becomes of I_p when it is stored: a scale for each p, and what half precision costs."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, relative_error
 from pipeline.arrays import Array
 from pipeline.bundle import half
-from pipeline.bundle.manifest import RelativeErrors, TaylorLoss
+from pipeline.bundle.manifest import TaylorLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour_error import delta_e
@@ -71,8 +71,7 @@ def measure(config: Config, table: TaylorTable, scale: Array) -> TaylorLoss:
         mirror = config.radiometry.mirror_luminance(wi, views)[known]
         before, after = before[known], after[known]
         if known.any():
-            found = relative_error(after[:, 1] / mirror, before[:, 1] / mirror, MIRROR_FLOOR)
-            errors[name] = RelativeErrors(**asdict(found))
+            errors[name] = relative_error(after[:, 1] / mirror, before[:, 1] / mirror, MIRROR_FLOOR)
             worst = max(worst, float(np.max(delta_e(after / unit, before / unit, _EXPOSURE_RU))))
     loss = TaylorLoss(
         layout="taylor",

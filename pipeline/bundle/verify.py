@@ -1,13 +1,32 @@
 """Verify: is a bundle what it was when it was published, and does it hold what its manifest says?"""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from pipeline.bundle import checksums, exr
+from pipeline.bundle import checksums
 from pipeline.bundle.checksums import SUMS
 from pipeline.bundle.manifest import MANIFEST, Image, Manifest, PolarGrid
+from pipeline.errors import DamagedError
+from pipeline.report import images
 from pipeline.store import digest
+
+if TYPE_CHECKING:
+    from pipeline.bundle.evaluator import Bundle
+
+
+def open_bundle(folder: Path) -> "Bundle":
+    """Read a bundle into memory. Raises DamagedError if it has faults.
+
+    The code that runs is this project's evaluator, never the bundle's copy.
+    """
+    from pipeline.bundle.evaluator import Bundle
+
+    faults = verify(folder)
+    if faults:
+        raise DamagedError(f"{folder}: {summary(faults)}. Fetch the bundle again, or publish it again")
+    return Bundle(folder)
 
 
 def verify(folder: Path) -> list[str]:
@@ -87,7 +106,7 @@ def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
             faults.append(f"{MANIFEST}: {table.file} is not of the grid's layout")
         if (table.width, table.height) != (manifest.grid.width, manifest.grid.height):
             faults.append(f"{MANIFEST}: {table.file} is not of the grid's size")
-        if table.pixel_type != manifest.precision or set(table.channels) != set(exr.CHANNELS):
+        if table.pixel_type != manifest.precision or set(table.channels) != set(images.RGBA):
             faults.append(f"{MANIFEST}: {table.file} is not RGBA of precision {manifest.precision}")
     return faults
 
@@ -105,7 +124,7 @@ def _image_faults(folder: Path, image: Image, unharmed: set[str]) -> list[str]:
     if image.file not in unharmed:
         return [] if (folder / image.file).exists() else [f"{MANIFEST}: names {image.file}, which is missing"]
     try:
-        found = exr.describe(folder / image.file)
+        found = images.describe(folder / image.file)
     except RuntimeError:
         return [f"{image.file} cannot be read as EXR"]
     expected = {key: getattr(image, key) for key in found}

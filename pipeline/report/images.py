@@ -12,6 +12,8 @@ from pipeline.errors import StorageError
 
 # ISO interop ID of linear CIE XYZ, D65 white: without it many readers take Y for luminance and Z for depth
 _XYZ_SPACE = "lin_ciexyzd65_scene"
+# of tables: GPUs have no three-channel half float
+RGBA = ("R", "G", "B", "A")
 
 
 def write_xyz(path: Path, image: Array) -> None:
@@ -20,6 +22,11 @@ def write_xyz(path: Path, image: Array) -> None:
     Raises StorageError.
     """
     write_exr(path, {f"brdf.{name}": image[..., c].astype(np.float32) for c, name in enumerate("XYZ")}, _XYZ_SPACE)
+
+
+def write_rgba(path: Path, pixels: NDArray[Any]) -> None:
+    """A table (rows, columns, RGBA) in float32 or float16, row 0 on top, as data. Raises StorageError."""
+    write_exr(path, {name: pixels[..., c] for c, name in enumerate(RGBA)}, "data")
 
 
 def write_exr(path: Path, channels: Mapping[str, NDArray[Any]], colour_space: str) -> None:
@@ -50,6 +57,25 @@ def read_xyz(path: Path) -> NDArray[np.float32]:
     with OpenEXR.File(str(path), separate_channels=True) as file:
         channels = file.channels()
         return np.stack([channels[f"brdf.{name}"].pixels for name in "XYZ"], axis=-1)
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Width, height, channel names (sorted) and pixel type ("float", "half", "uint", "mixed") of an EXR.
+
+    Raises RuntimeError where the file is none.
+    """
+    import OpenEXR
+
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = file.channels()
+        first, last = file.header()["dataWindow"]
+        types = {channel.type().name.lower() for channel in channels.values()}
+        return {
+            "width": int(last[0] - first[0] + 1),
+            "height": int(last[1] - first[1] + 1),
+            "channels": sorted(channels),
+            "pixel_type": types.pop() if len(types) == 1 else "mixed",
+        }
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:

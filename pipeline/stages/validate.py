@@ -125,4 +125,4 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
 def stage_of(config: Config) -> Stage:
     """Validation of either layout: it reads what the table was made of, too."""
     before = "stack" if isinstance(config.table, TaylorLayout) else "power_spectrum"
-    return Stage("validate", 2, ("surface", before, "table", "render"), _parameters, _produce)
+    return Stage("validate", 3, ("surface", before, "table", "render"), _parameters, _produce)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.config.models import Config
-from pipeline.report.page import Page
+from pipeline.report import template
 from pipeline.store.store import Artifact
 
 Rows = list[list[str]]
@@ -110,45 +110,27 @@ def build(
     """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
     surface, table, render = (inputs[name].summary for name in ("surface", "table", "render"))
     before = next(inputs[name].summary for name in ("stack", "power_spectrum") if name in inputs)
-    page = Page(config.name, "Diffraction BRDF: what was baked and how far it is from the exact sum.")
-    page.warnings(surface["warnings"])
-    page.section("BRDF maps", f"All views of one light each, at {config.render.exposure_ru:g} RU.")
-    page.pictures(
-        [
-            ((inputs["render"].folder / m["png"]).read_bytes(), f"θ = {m['theta_deg']:g}°, φ = {m['phi_deg']:g}°")
-            for m in render["maps"]
-        ]
+    return template.html(
+        "pipeline.report",
+        "validation.html.in",
+        title=config.name,
+        subtitle="Diffraction BRDF: what was baked and how far it is from the exact sum.",
+        warnings=surface["warnings"],
+        exposure_ru=config.render.exposure_ru,
+        maps=[((inputs["render"].folder / light["png"]).read_bytes(), light) for light in render["maps"]],
+        surface=_surface_rows(surface),
+        settings=_settings_rows(before, table),
+        error_columns=ERROR_COLUMNS,
+        errors=error_rows(results),
+        relative_errors=_relative_error_rows(results),
+        pictures=pictures,
+        studied=_STUDIED[table["layout"]],
     )
-    page.section("Surface")
-    page.table(["", ""], _surface_rows(surface))
-    page.picture(pictures["surface"], "The height field as baked: levelled and centred, y up.")
-    page.section("Table")
-    page.table(["", ""], _settings_rows(before, table))
-    _add_errors(page, results)
-    for name, png in pictures.items():
-        if name.startswith("comparison"):
-            page.picture(png, "Reference, table and their difference.")
-    page.section("How the error depends on the settings")
-    page.picture(
-        pictures["convergence"],
-        "Mean error as one setting varies and the others stay as configured (61 x 61 views, first light). "
-        + _STUDIED[table["layout"]],
-    )
-    return page.render()
 
 
-def _add_errors(page: Page, results: dict[str, Any]) -> None:
-    page.section(
-        "Error against the reference",
-        "The reference integrates every nanometre, without Taylor series, table or interpolation. Colour error is "
-        "CIELAB ΔE*ab of the colours a screen shows at each exposure.",
-    )
-    page.table(ERROR_COLUMNS, error_rows(results))
+def _relative_error_rows(results: dict[str, Any]) -> Rows:
     kinds = [
         ("table on random directions", results["random"]["power"]),
         ("reference against sums over samples", results["reference"]),
     ]
-    page.table(
-        ["relative error of |P|²", "median", "99th %", "max"],
-        [[name, *(f"{e[key]:.1e}" for key in ("median", "percentile_99", "maximum"))] for name, e in kinds],
-    )
+    return [[name, *(f"{e[key]:.1e}" for key in ("median", "percentile_99", "maximum"))] for name, e in kinds]

@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipeline import Bundle, bake, load_scan
-from pipeline.bundle.evaluate import Bundle as Evaluator
+from pipeline.bundle.evaluator import Bundle as Evaluator
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, BakeError, ConfigError, DamagedError, InputError, StorageError
 from pipeline.optics.geometry import direction
@@ -233,3 +233,22 @@ def test_annotations_are_published() -> None:
     for room in ("pipeline", "kernels"):
         assert (REPOSITORY / room / "py.typed").is_file()
         assert "py.typed" in packaged["package-data"][room]
+
+
+def test_files_that_code_reads_are_published() -> None:
+    """Kernels, shaders, templates and tables of numbers are installed with the modules that read them."""
+    settings = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    packaged = {
+        path
+        for package, patterns in settings["package-data"].items()
+        for pattern in patterns
+        for path in (REPOSITORY / package.replace(".", "/")).glob(pattern)
+    }
+    present = {
+        path
+        for room in ("pipeline", "kernels", "cli")
+        for path in (REPOSITORY / room).rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    }
+    assert packaged == present
+    assert {".cl", ".glsl", ".in", ".csv"} <= {path.suffix for path in packaged}

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("cli", "pipeline", "kernels")
-HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "OpenEXR", "PIL", "SurfaceTopography"}
+HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "OpenEXR", "PIL", "SurfaceTopography", "jinja2"}
 STAGE_FREE = ("tables", "fourier", "diffraction", "accuracy", "optics", "surface")
 
 

@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
+from pydantic import TypeAdapter
 
+from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import polar_storage
-from pipeline.bundle.manifest import CertificateEntry, ColourErrors, Manifest, PolarGrid, PolarLoss
-from pipeline.bundle.open import bundle_evaluator
+from pipeline.bundle.manifest import Manifest, PolarGrid, PolarLoss
 from pipeline.bundle.publish import publish, published
-from pipeline.bundle.verify import verify
+from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError, ConfigError
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import polar_table
 from pipeline.tables.evaluate import table_evaluator
@@ -76,7 +77,7 @@ def test_the_mapping_told_is_the_grids(bake: Baker, bundle: Path) -> None:
 
 def test_the_manifest_tells_certificate_plan_and_stages(bake: Baker, bundle: Path) -> None:
     inputs, told = bake(small("polar")), manifest_of(bundle)
-    assert told.certificate == CertificateEntry.model_validate(inputs["table"].summary["certificate"])
+    assert told.certificate == TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"])
     assert (told.plan["w_terms"], told.plan["windows"]) == (12, inputs["power_spectrum"].summary["windows"])
     assert list(told.provenance.artifacts) == ["surface", "power_spectrum", "table", "render", "validate"]
     assert told.made_by.stages.keys() == told.provenance.artifacts.keys()
@@ -89,8 +90,10 @@ def test_the_readme_shows_the_certificate_and_its_own_numbers(bundle: Path) -> N
     text, told = (bundle / "README.md").read_text(encoding="utf-8"), manifest_of(bundle)
     assert told.certificate is not None
     assert f"keeps {told.certificate.measured:.3g}" in text
-    assert "const int RINGS = 40, AZIMUTHS = 192, TEXTURES = 9, TERMS = 12;" in text
-    assert f"R0 = {grid_of(told).r0!r}, STEP = {grid_of(told).step!r}" in text
+    for name, value in (("RINGS", 40), ("AZIMUTHS", 192), ("TEXTURES", 9), ("TERMS", 12)):
+        assert f"const int {name} = {value};" in text
+    for name, number in (("R0", grid_of(told).r0), ("STEP", grid_of(told).step)):
+        assert f"const float {name} = {number!r};" in text
 
 
 def test_a_standing_bundle_is_found_again(bake: Baker, bundle: Path) -> None:
@@ -120,7 +123,7 @@ def test_a_bundle_errs_as_it_says(
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
     table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
-    evaluate = bundle_evaluator(folder)
+    evaluate = open_bundle(folder).xyz
     mirror = wi * [-1.0, -1.0, 1.0]
     for views, error in ((wr, loss_of(told).added), (mirror, loss_of(told).added_in_mirror)):
         found = delta_e(evaluate(wi, views), table(wi, views), error.exposure_ru)
@@ -173,7 +176,7 @@ def test_auto_takes_all_where_no_number_keeps_the_budget(
         tried.append(stored.textures.count)
         found = measure(self, stored)
         return found.model_copy(
-            update={"error": ColourErrors(exposure_ru=7500.0, mean=200.0, percentile_99=0.0, maximum=0.0)}
+            update={"error": ColourError(exposure_ru=7500.0, mean=200.0, percentile_99=0.0, maximum=0.0)}
         )
 
     monkeypatch.setattr(polar_storage._Measure, "__call__", hopeless)

@@ -12,12 +12,13 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from pipeline.bundle import checksums, exr
+from pipeline.bundle import checksums
 from pipeline.bundle.manifest import Manifest, TaylorGrid
 from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
 from pipeline.optics import validity
+from pipeline.report import images
 from pipeline.stages import taylor_table
 from pipeline.surface.statistics import Period
 from pipeline.tables.taylor import grid
@@ -158,7 +159,7 @@ def test_an_interrupted_publish_leaves_nothing(bake: Baker, tmp_path: Path, monk
             raise KeyboardInterrupt
         path.touch()
 
-    monkeypatch.setattr(exr, "write_rgba", interrupted)
+    monkeypatch.setattr(images, "write_rgba", interrupted)
     with pytest.raises(KeyboardInterrupt):
         publish(small(), bake(small()), tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -172,7 +173,7 @@ def test_a_place_that_cannot_be_written_is_told(bake: Baker, tmp_path: Path) -> 
 
 def test_an_exr_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="disk full"):
-        exr.write_rgba(tmp_path / "none" / "a.exr", np.zeros((2, 2, 4), np.float32))
+        images.write_rgba(tmp_path / "none" / "a.exr", np.zeros((2, 2, 4), np.float32))
 
 
 def test_everybody_may_read_a_bundle(bundle: Path) -> None:

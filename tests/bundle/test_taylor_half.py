@@ -9,9 +9,8 @@ import pytest
 
 from pipeline.bundle import taylor_half
 from pipeline.bundle.manifest import TaylorLoss
-from pipeline.bundle.open import bundle_evaluator
 from pipeline.bundle.publish import publish
-from pipeline.bundle.verify import verify
+from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.random_directions import random_pairs
@@ -68,7 +67,7 @@ def test_a_half_bundle_errs_as_it_says(bake: Baker, tmp_path: Path) -> None:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(np.float16)}
     wi, wr = random_pairs(None, 2000, taylor_half._SEED)
     exact = table_evaluator(taylor_table.load(inputs["table"]), config.radiometry)
-    evaluate = bundle_evaluator(folder)
+    evaluate = open_bundle(folder).xyz
     mirrored = wi * [-1.0, -1.0, 1.0]
     loss = told.storage_loss
     assert isinstance(loss, TaylorLoss)

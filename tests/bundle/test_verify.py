@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.bundle import checksums, exr
-from pipeline.bundle.open import bundle_evaluator
+from pipeline.bundle import checksums
 from pipeline.bundle.publish import publish
-from pipeline.bundle.verify import verify
+from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import DamagedError
+from pipeline.report import images
 
 from .conftest import LAYOUTS, Baker, small
 
@@ -77,7 +77,7 @@ def test_tables_of_either_layout_are_checked(bake: Baker, tmp_path: Path, layout
     config = small(layout)
     folder = publish(config, bake(config), tmp_path)
     assert verify(folder) == []
-    empty = forged(folder, lambda folder: exr.write_rgba(folder / FIRST[layout], np.zeros((2, 2, 4), np.float32)))
+    empty = forged(folder, lambda folder: images.write_rgba(folder / FIRST[layout], np.zeros((2, 2, 4), np.float32)))
     assert {fault.split(":")[0] for fault in verify(empty)} == {FIRST[layout]}
 
 
@@ -179,7 +179,7 @@ def test_an_image_that_is_not_what_the_manifest_says(
     bundle: Path, size: tuple[int, int], kind: type, fault: str
 ) -> None:
     path = "tables/I_01.exr"
-    folder = forged(bundle, lambda folder: exr.write_rgba(folder / path, np.zeros((*size, 4), kind)))
+    folder = forged(bundle, lambda folder: images.write_rgba(folder / path, np.zeros((*size, 4), kind)))
     assert any(line.startswith(f"{path}: {fault}") for line in verify(folder))
 
 
@@ -194,4 +194,4 @@ def test_an_image_that_is_none(bundle: Path) -> None:
 def test_a_damaged_bundle_gives_no_light(bundle: Path) -> None:
     (bundle / "evaluate.py").unlink()
     with pytest.raises(DamagedError, match=r"evaluate\.py is missing"):
-        bundle_evaluator(bundle)
+        open_bundle(bundle)

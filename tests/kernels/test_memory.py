@@ -34,3 +34,12 @@ def test_two_arrays_never_share():
     for i, array in enumerate(arrays):
         array[...] = i
     assert all(np.all(array == i) for i, array in enumerate(arrays))
+
+
+def test_what_is_lent_holds_the_array():
+    """A part with gaps begins on a cache line, too, where the whole does: it is copied."""
+    array = device.empty((4, 32), np.float32)
+    array[...] = np.arange(128).reshape(4, 32)
+    for part in (array, array[:, :16]):
+        found = device.download(device.lent(part), np.empty(part.shape, np.float32))
+        np.testing.assert_array_equal(found, part)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Array
-from pipeline.bundle import evaluate, material
-from pipeline.bundle.open import bundle_evaluator
+from pipeline.bundle import evaluator, material
 from pipeline.bundle.polar import grid_entry
 from pipeline.bundle.publish import publish
+from pipeline.bundle.verify import open_bundle
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
@@ -37,7 +37,7 @@ def both(bake: Baker, config: Config, out: Path, wi: Array, wr: Array) -> tuple[
     """XYZ by the bundle's page and by the tool, as shares of what a mirror gives."""
     inputs = bake(config)
     expected = table_evaluator(table_stage.load(config, inputs["table"]), config.radiometry)(wi, wr)
-    found = bundle_evaluator(publish(config, inputs, out))(wi, wr)
+    found = open_bundle(publish(config, inputs, out)).xyz(wi, wr)
     mirror = config.radiometry.mirror_luminance(wi, wr)[:, None]
     return found / mirror, expected / mirror
 
@@ -79,7 +79,7 @@ def test_a_table_without_symmetry_is_looked_up_alike() -> None:
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), w])
     textures = whole(table)
     planes = [np.moveaxis(textures.values[:, 4 * q : 4 * q + 4], 1, -1) for q in range(textures.count)]
-    page = evaluate.PolarTable(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
+    page = evaluator.PolarTable(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
     np.testing.assert_allclose(page.value(*uvw), table.look_up(uvw.T), atol=2e-4)
 
 
@@ -92,7 +92,7 @@ def test_what_the_scene_leaves_out_is_nan(bake: Baker, tmp_path: Path, layout: s
 
 
 def test_the_horizon_is_refused(bake: Baker, tmp_path: Path) -> None:
-    xyz = bundle_evaluator(publish(small(), bake(small()), tmp_path))
+    xyz = open_bundle(publish(small(), bake(small()), tmp_path)).xyz
     up, level = np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]])
     for pair in ((up, level), (level, up)):
         with pytest.raises(ValueError, match="horizon"):
@@ -155,10 +155,10 @@ def test_it_runs_as_a_script(bundle: Path, tmp_path: Path) -> None:
     wi = geometry.direction(np.radians([0, 30, 60]), np.radians([0, 10, 0]))
     wr = geometry.direction(np.radians([0, 40, 0]), np.radians([0, -170, 90]))
     found = np.array([[float(cell) for cell in line.split(",")] for line in lines])
-    np.testing.assert_allclose(found, bundle_evaluator(bundle)(wi, wr), rtol=1e-11)
+    np.testing.assert_allclose(found, open_bundle(bundle).xyz(wi, wr), rtol=1e-11)
 
 
-@pytest.mark.parametrize("row", ["0,0,90,0", "1,2,3", "0,0,-1,0", "0,0,x,0", "0,nan,0,0"])
+@pytest.mark.parametrize("row", ["", "0,0,90,0", "1,2,3", "0,0,-1,0", "0,0,x,0", "0,nan,0,0"])
 def test_it_refuses_rows_that_are_no_directions(bundle: Path, tmp_path: Path, row: str) -> None:
     csv = tmp_path / "directions.csv"
     csv.write_text(f"{row}\n", encoding="utf-8")

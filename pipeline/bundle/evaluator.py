@@ -16,7 +16,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-AT_ONCE = 16384  # directions, to bound memory
+COLUMNS, AT_ONCE = "theta_i,phi_i,theta_r,phi_r", 16384  # directions at once, to bound memory
 
 
 class Bundle:
@@ -157,17 +157,21 @@ def direction(theta_deg: Array, phi_deg: Array) -> Array:
 
 
 def read_directions(text: str) -> Array:
-    """Rows (directions, 4) of a CSV in degrees; '#' starts a comment line, the column names may lead."""
-    lines = [line for line in text.splitlines() if line.strip() and line[0] not in "#t"]
-    rows = np.full((len(lines), 4), np.nan)
-    for i, line in enumerate(lines):
-        cells = line.split(",")
-        rows[i] = cells if len(cells) == 4 else np.nan
-        if not (np.all(np.isfinite(rows[i])) and np.all((rows[i, ::2] >= 0.0) & (rows[i, ::2] < 90.0))):
-            raise ValueError(
-                f"expected theta_i,phi_i,theta_r,phi_r in degrees, theta from 0 to below 90, got {line!r}"
-            )
-    return rows
+    """Rows (directions, 4) of a CSV in degrees; '#' starts a comment, the names of the columns may lead."""
+    rows: list[list[float]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.partition("#")[0].strip()
+        if content and (rows or content.replace(" ", "") != COLUMNS):
+            try:
+                theta_i, phi_i, theta_r, phi_r = map(float, content.split(","))
+            except ValueError:
+                raise ValueError(f"line {number}: expected four numbers {COLUMNS}, got {content!r}") from None
+            if not (0 <= theta_i < 90 and 0 <= theta_r < 90 and abs(phi_i) < 1e6 and abs(phi_r) < 1e6):
+                raise ValueError(f"line {number}: expected theta in [0, 90) and finite phi, degrees, got {content!r}")
+            rows.append([theta_i, phi_i, theta_r, phi_r])
+    if not rows:
+        raise ValueError(f"expected rows of {COLUMNS} in degrees, got none")
+    return np.array(rows)
 
 
 if __name__ == "__main__":
@@ -178,6 +182,4 @@ if __name__ == "__main__":
         found = Bundle(Path(__file__).parent).xyz(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
     except (OSError, ValueError) as error:
         sys.exit(f"{sys.argv[1]}: {error}")
-    print("X,Y,Z")
-    for values in found:
-        print(",".join(f"{value:.12g}" for value in values))
+    print("X,Y,Z", *(",".join(f"{value:.12g}" for value in values) for values in found), sep="\n")

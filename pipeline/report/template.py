@@ -1,0 +1,35 @@
+"""Texts as files: jinja2 templates, in the folder templates/ of a package."""
+
+import base64
+from typing import Any
+
+
+def markdown(package: str, name: str, **values: Any) -> str:
+    """Fill a template of a package with values, as they are.
+
+    Raises jinja2.UndefinedError for a value that the template asks for and does not get.
+    """
+    return _fill(package, name, values, autoescape=False)
+
+
+def html(package: str, name: str, **values: Any) -> str:
+    """Fill a template of a package with values, escaped for HTML; it may extend the pages of pipeline.report.
+
+    Raises jinja2.UndefinedError for a value that the template asks for and does not get.
+    """
+    return _fill(package, name, values, autoescape=True)
+
+
+def _fill(package: str, name: str, values: dict[str, Any], *, autoescape: bool) -> str:
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=ChoiceLoader([PackageLoader(package), PackageLoader("pipeline.report")]),
+        undefined=StrictUndefined,
+        autoescape=autoescape,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["base64"] = lambda data: base64.b64encode(data).decode("ascii")
+    return environment.get_template(name).render(values)
