@@ -30,12 +30,10 @@ def run_command(
     if until is not None:
         _bake_until(load_all(config_paths), until, store_root, as_json)
         return
-    bake_all(config_paths, out, store_root, as_json, with_bundle=True)
+    bake_all(config_paths, out, store_root, as_json, until="bundle")
 
 
-def bake_all(
-    paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, *, with_bundle: bool
-) -> None:
+def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, until: str) -> None:
     """Every stage of CONFIGs, what people look at laid out, and what came of it told."""
     from pipeline.errors import AccuracyError
     from pipeline.store import scratch
@@ -43,7 +41,7 @@ def bake_all(
     loaded = load_all(paths)
     for config in loaded:
         scratch.require_folder(out / config.name)
-    baked = [_bake(config, out, store_root, with_bundle) for config in loaded]
+    baked = [_bake(config, out, store_root, until) for config in loaded]
     results = [result for result, _ in baked]
     if as_json:
         console.print_json(results)
@@ -81,7 +79,8 @@ def _bake_until(loaded: list[Config], until: str, store_root: Path | None, as_js
 def _certified(certificate: dict[str, Any]) -> str:
     return (
         f"mean CIELAB error {certificate['measured']:.3f} at {certificate['exposure_ru']:g} RU on "
-        f"{certificate['random']['directions']} random directions, {certificate['delta_e']:g} allowed"
+        f"{certificate['random']['directions']} random directions"
+        + ("" if certificate["delta_e"] is None else f", {certificate['delta_e']:g} allowed")
     )
 
 
@@ -98,16 +97,19 @@ def load_all(paths: tuple[Path, ...]) -> list[Config]:
     return loaded
 
 
-def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool) -> tuple[dict[str, Any], str | None]:
-    """What came of a config, for machines, and a line where it missed its budget."""
-    from pipeline.bundle import bake
+def _bake(config: Config, out: Path, store_root: Path | None, until: str) -> tuple[dict[str, Any], str | None]:
+    """The results of a config for machines, and a line where it missed its budget."""
+    from pipeline.stages import bake
 
     store = console.open_store(store_root)
     console.note(f"{config.name}:")
-
+    bundle = None
     with console.showing_progress() as progress:
-        made = bake.make(config, store, out / config.name, progress, console.teller(config, store))
-        bundle = publish_bundle(config, store, made.artifacts, out / config.name, progress) if with_bundle else None
+        given = config, store, out / config.name, progress, console.teller(config, store)
+        if until == "bundle":
+            made, bundle = bake.make(*given)
+        else:
+            made = bake.validate(*given)
     result = {
         "name": config.name,
         "stages": {name: {"key": a.key, "summary": a.summary} for name, a in made.artifacts.items()},
@@ -115,15 +117,6 @@ def _bake(config: Config, out: Path, store_root: Path | None, with_bundle: bool)
         "bundle": None if bundle is None else str(bundle),
     }
     return result, made.missed_budget
-
-
-def publish_bundle(config: Config, store: Any, artifacts: Any, folder: Path, progress: Any) -> Path:
-    """The bundle in `folder`; how long it took is told."""
-    from pipeline.bundle.bake import publish_once
-
-    bundle, seconds = publish_once(config, store, artifacts, folder, progress)
-    console.note("  bundle    " + ("cached" if seconds is None else f"{seconds:.1f} s"))
-    return bundle
 
 
 def _tell(result: dict[str, Any]) -> None:
@@ -138,13 +131,12 @@ def _tell(result: dict[str, Any]) -> None:
 
 @click.command("plan")
 @click.argument("config_paths", metavar="CONFIG...", type=click.Path(path_type=Path), nargs=-1, required=True)
-@console.out_option
 @console.store_option
 @console.json_option
-def plan_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool) -> None:
+def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_json: bool) -> None:
     """Say what `run` would do: every stage cached or to do, why, and its cost. Computes nothing."""
     store = console.open_store(store_root)
-    plans = {config.name: _plan(config, store, out / config.name) for config in load_all(config_paths)}
+    plans = {config.name: _plan(config, store) for config in load_all(config_paths)}
     if as_json:
         console.print_json(plans)
         return
@@ -156,13 +148,12 @@ def plan_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | N
                 click.echo(f"{step['stage']}: {step['reason']}")
 
 
-def _plan(config: Config, store: Any, folder: Path) -> list[dict[str, str]]:
-    """Every stage and, last, the bundle."""
-    from pipeline.bundle.publish import published
+def _plan(config: Config, store: Any) -> list[dict[str, str]]:
+    """A row a stage."""
     from pipeline.stages import run
 
     steps = run.plan(config, store)
-    rows = [
+    return [
         {
             "stage": step.stage.name,
             "key": step.key,
@@ -172,12 +163,3 @@ def _plan(config: Config, store: Any, folder: Path) -> list[dict[str, str]]:
         }
         for step, told in zip(steps, run.explain(config, steps, store), strict=True)
     ]
-    standing = published(config, {step.stage.name: step.key for step in steps}, folder)
-    bundle = {
-        "stage": "bundle",
-        "key": "" if standing is None else standing.name,
-        "state": "to do" if standing is None else "cached",
-        "reason": f"none of this content stands in {folder}" if standing is None else run.UNCHANGED,
-        "cost": "tables, maps and report",
-    }
-    return [*rows, bundle]

@@ -18,17 +18,16 @@ def publish_command(config_path: Path, out: Path, store_root: Path | None, as_js
     The bundle holds the tables as EXR, a manifest, a one-page numpy evaluator, maps, report and SHA256SUMS. The same
     content gives the same digest; a standing bundle is never overwritten.
     """
-    from cli.bake import publish_bundle
-    from pipeline.stages import run
+    from pipeline.stages import bundle, run
 
     config, store = sources.load(config_path), console.open_store(store_root)
     with console.showing_progress() as progress:
         artifacts = run.execute(config, run.plan(config, store), store, progress, console.teller(config, store))
-        bundle = publish_bundle(config, store, artifacts, out / config.name, progress)
+        placed = bundle.place(store.open("bundle", artifacts["bundle"].key), out / config.name)
     if as_json:
-        console.print_json({"bundle": str(bundle)})
+        console.print_json({"bundle": str(placed)})
     else:
-        click.echo(str(bundle))
+        click.echo(str(placed))
 
 
 @click.command("verify")

@@ -42,10 +42,10 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
         from pipeline.stages import surface
 
         return reference_evaluator(surface.load(artifact), config, progress)
-    from pipeline.stages import table
+    from pipeline import layouts
     from pipeline.tables.evaluate import table_evaluator
 
-    return table_evaluator(table.load(config, artifact), config.radiometry, progress)
+    return table_evaluator(layouts.of(config.table).load(artifact), config.radiometry, progress)
 
 
 def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
@@ -57,7 +57,8 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
         raise click.UsageError('--wavelengths needs table.form = "spectral" in the config, or --exact')
     from pipeline.accuracy.exact import reference_of
     from pipeline.optics.geometry import uvw
-    from pipeline.stages import power_spectrum, run, surface
+    from pipeline.stages import run, surface
+    from pipeline.stages.polar import power_spectrum
     from pipeline.tables.polar import spectral
 
     store = console.open_store(store_root)

@@ -52,7 +52,7 @@ def validate_command(
         raise click.UsageError("--quick, --elaphe and --xenopeltis belong to --bench")
     if not config_paths:
         raise click.UsageError("Missing argument '[CONFIG]...'; or --bench for the validation bench")
-    bake_all(config_paths, out, store_root, as_json, with_bundle=False)
+    bake_all(config_paths, out, store_root, as_json, until="validate")
 
 
 def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root: Path | None, as_json: bool) -> None:

@@ -49,8 +49,7 @@ class Baked:
 
     name: the config's. bundle: the bundle's folder. report: one page with everything. maps: BRDF maps of the
     config's lights, an EXR (linear XYZ at 1 RU) and a PNG each. measured_error: errors of the table, as in
-    manifest.json. certificate: what a polar table keeps on directions that its planning never saw, likewise; None
-    for the paper's layout.
+    manifest.json. certificate: errors of the table on random directions, likewise.
     """
 
     name: str
@@ -58,7 +57,7 @@ class Baked:
     report: Path
     maps: tuple[Path, ...]
     measured_error: Mapping[str, Any]
-    certificate: Mapping[str, Any] | None
+    certificate: Mapping[str, Any]
 
 
 def bake(
@@ -84,7 +83,7 @@ def bake(
     DeviceError without a working OpenCL device; DamagedError for what is no longer what it was; StorageError where
     nothing can be written.
     """
-    from pipeline.bundle import bake as baking
+    from pipeline.stages import bake as baking
     from pipeline.stages import config_check
     from pipeline.store import scratch
     from pipeline.store.store import Store, users_folder
@@ -100,8 +99,7 @@ def bake(
     folder = Path(out) / config.name
     scratch.require_folder(folder)
     opened = Store(users_folder() if store is None else Path(store))
-    made = baking.make(config, opened, folder, progress)
-    bundle, _ = baking.publish_once(config, opened, made.artifacts, folder, progress)
+    made, bundle = baking.make(config, opened, folder, progress)
     if made.missed_budget is not None:
         raise AccuracyError(made.missed_budget)
     *maps, report = made.files
@@ -111,7 +109,7 @@ def bake(
         report=report,
         maps=tuple(maps),
         measured_error=made.artifacts["validate"].summary,
-        certificate=made.artifacts["table"].summary.get("certificate"),
+        certificate=made.artifacts["table"].summary["certificate"],
     )
 
 

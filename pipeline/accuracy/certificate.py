@@ -4,7 +4,7 @@ The reference shares none of the table's approximations: a float64 stack with sp
 direction and every nanometre. It is checked itself, in every bake, against sums over samples on a few directions.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,45 +28,51 @@ from pipeline.progress import Progress, silent
 from pipeline.tables.evaluate import Evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.polar import spectral
-from pipeline.tables.polar.layout import PolarLayout
 
 _SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What a table was promised to keep, and what it keeps.
+    """The errors of a table on random directions, and the budget that it has to keep.
 
-    random: against the reference on random directions. reference: the reference against sums over samples.
-    measured: the mean CIELAB error on them at `exposure_ru`, to be held against `delta_e`.
+    delta_e: mean CIELAB error allowed; None where no budget is set. exposure_ru: exposure of both, RU.
+    measured: mean CIELAB error at `exposure_ru`. random: the table against the reference on random directions.
+    reference: the reference against sums over samples.
     """
 
-    delta_e: float
+    delta_e: float | None
     exposure_ru: float
     measured: float
     random: RandomCheck
     reference: RelativeError
 
 
-def certify(
+def measure(
     evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> Certificate:
-    """The certificate of a table (`evaluate`), beside the reference of its height field.
+    """Measures a table against the exact reference of its height field, and the reference against plain sums.
 
-    Raises AccuracyError where it misses its budget, or where the reference's two routes part.
+    evaluate: the table's XYZ for pairs of directions. Raises AccuracyError where the reference's two algorithms differ.
     """
     checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(evaluate, reference, config, progress)
     exposure = config.accuracy.exposure_ru
-    measured = _at(random.colour, exposure)
-    budget = config.budget_delta_e
-    if measured > budget:
+    return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, checked)
+
+
+def certify(
+    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+) -> Certificate:
+    """Measures a table that was planned for a budget. Raises AccuracyError where it misses it."""
+    found = replace(measure(evaluate, reference, config, progress), delta_e=config.budget_delta_e)
+    if found.measured > config.budget_delta_e:
         raise AccuracyError(
-            f"the table misses its budget: on {random.directions} random directions its mean CIELAB error at "
-            f"{exposure:g} RU is {measured:.3g}, and accuracy.delta_e allows {budget:g}. "
-            f"{_way_out(reference, config)}"
+            f"the table misses its budget: on {found.random.directions} random directions its mean CIELAB error at "
+            f"{found.exposure_ru:g} RU is {found.measured:.3g}, and accuracy.delta_e allows "
+            f"{config.budget_delta_e:g}. {_way_out(reference, config)}"
         )
-    return Certificate(budget, exposure, measured, random, checked)
+    return found
 
 
 def _way_out(reference: MeanReference, config: Config) -> str:
@@ -81,10 +87,8 @@ def _way_out(reference: MeanReference, config: Config) -> str:
     )
 
 
-def certify_spectral(power: PolarPowerSpectrum, reference: MeanReference, config: Config) -> RelativeError | None:
-    """Errors of I_lambda on random directions, where a config asks for the spectral form: else nothing to say."""
-    if not isinstance(config.table, PolarLayout) or config.table.form != "spectral":
-        return None
+def certify_spectral(power: PolarPowerSpectrum, reference: MeanReference, config: Config) -> RelativeError:
+    """Errors of I_lambda of the spectral form on random directions."""
     wi, wr = random_pairs(config.scene, _SPECTRAL_DIRECTIONS, _SEED)
     uvw = geometry.uvw(wi, wr)
     wavelengths = trapezoid(config.light, _SPECTRAL_STEP_NM).lambda_nm

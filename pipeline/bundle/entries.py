@@ -12,7 +12,6 @@ from pipeline.store.digest import of_file
 from pipeline.store.store import Artifact
 from pipeline.surface.statistics import Period
 from pipeline.tables.taylor import grid
-from pipeline.tables.taylor.layout import TaylorLayout
 
 _NOT_RECORDED = "not recorded"
 _LUMINOUS_NM = 550.0
@@ -50,7 +49,7 @@ def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
         observer=config.light.observer,
         illuminant=_illuminant(config),
         range_nm=list(config.light.range_nm),
-        step_nm=config.table.step_nm if isinstance(config.table, TaylorLayout) else None,
+        step_nm=config.table.integral_step_nm,
         wavelengths=inputs["table"].summary["wavelengths"],
     )
 
@@ -99,10 +98,10 @@ def made_by(inputs: Mapping[str, Artifact]) -> MadeBy:
 
 def provenance(config: Config, keys: Mapping[str, str]) -> Provenance:
     """Where the bundle comes from; `keys` are the artifacts' addresses by stage."""
-    return Provenance(config=_resolved(config), artifacts=dict(keys))
+    return Provenance(config=resolved(config), artifacts=dict(keys))
 
 
-def _resolved(config: Config) -> dict[str, Any]:
+def resolved(config: Config) -> dict[str, Any]:
     """The whole config, files by name and content, without folders of this machine."""
     resolved = config.model_dump(mode="json")
     resolved["surface"]["path"] = None if config.surface.path is None else _named_file(config.surface.path)

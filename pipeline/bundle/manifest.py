@@ -257,7 +257,7 @@ class Manifest(Validated):
     coverage: Coverage
     domain: Domain
     plan: dict[str, Any]
-    certificate: Certificate | None
+    certificate: Certificate
     measured_error: dict[str, Any]
     storage_loss: StorageLoss | None
     surface: dict[str, Any]

@@ -1,6 +1,7 @@
 """Polar tables in a bundle: images of spline coefficients, four outputs in each."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -11,10 +12,10 @@ from pipeline.bundle.manifest import PolarGrid, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
+from pipeline.diffraction.reference import MeanReference
 from pipeline.report import images
-from pipeline.stages import polar_table, surface
-from pipeline.store.store import Artifact
 from pipeline.tables.polar.compression import CHANNELS, Textures
+from pipeline.tables.polar.table import PolarTable
 
 _CONVENTION = (
     "value(u, v, |w|) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the factors of the "
@@ -28,13 +29,21 @@ _WINDOW = (
     "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch; where plan.windows > 1, |P|^2 is its mean over "
     "so many windows beside each other"
 )
-_PLANNED = ("terms", "s_nodes", "w_terms", "probed_delta_e", "windows", "speckle_contrast")
 
 
-def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
-    """A polar table's part of a bundle. Raises AccuracyError where what is stored misses a budget."""
-    table = polar_table.load(inputs["table"])
-    stored, loss = polar_storage.choose(config, table, surface.load(inputs["surface"]))
+def prepare(
+    config: Config,
+    table: PolarTable,
+    reference: Callable[[], MeanReference],
+    plan: dict[str, Any],
+    certificate: dict[str, Any],
+) -> Prepared:
+    """Makes a polar table ready for a bundle.
+
+    reference: makes the exact reference of the surface, which is asked for where storage loses digits.
+    plan, certificate: of the table, for the manifest. Raises AccuracyError where the stored table misses a budget.
+    """
+    stored, loss = polar_storage.choose(config, table, reference)
     entry = grid_entry(stored.textures)
     return Prepared(
         holds="value",
@@ -43,8 +52,8 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         grid=entry,
         images=_images(config, stored),
         count=stored.textures.count,
-        plan={key: inputs["power_spectrum"].summary.get(key) for key in _PLANNED},
-        certificate=TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"]),
+        plan=plan,
+        certificate=TypeAdapter(Certificate).validate_python(certificate),
         loss=loss,
         constants={
             "RINGS": entry.height,

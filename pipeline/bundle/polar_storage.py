@@ -1,6 +1,6 @@
 """How a polar table is stored: in how many textures, at what precision, and what that costs on random directions."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
-from pipeline.accuracy.exact import reference_of
 from pipeline.arrays import Array
 from pipeline.bundle import half
 from pipeline.bundle.manifest import PolarLoss
 from pipeline.config.models import Config
+from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
-from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar.compression import Textures, compress, flattened, most_textures, whole
 from pipeline.tables.polar.table import PolarTable
@@ -54,7 +53,9 @@ def store(textures: Textures, precision: str) -> Stored:
     return Stored(values, scale, replace(flat, values=values.astype(np.float32) * factor))
 
 
-def choose(config: Config, table: PolarTable, field: HeightField) -> tuple[Stored, PolarLoss | None]:
+def choose(
+    config: Config, table: PolarTable, reference: Callable[[], MeanReference]
+) -> tuple[Stored, PolarLoss | None]:
     """What [publish] asks for, and what it costs: None where nothing is lost.
 
     "auto" in half floats takes the fewest textures whose error is within the budget, all where none is. Raises
@@ -63,7 +64,7 @@ def choose(config: Config, table: PolarTable, field: HeightField) -> tuple[Store
     asked, precision = config.publish.textures, config.publish.precision
     if precision == "float" and asked in ("auto", "full"):
         return store(whole(table), precision), None
-    measure = _Measure(config, table, field)
+    measure = _Measure(config, table, reference())
     for count in _candidates(asked, most_textures(table)):
         stored = store(_textures(table, count, config), precision)
         loss = measure(stored)
@@ -87,10 +88,9 @@ def _textures(table: PolarTable, count: int, config: Config) -> Textures:
 class _Measure:
     """Holds what is stored against the exact sum and against the table before, on random directions."""
 
-    def __init__(self, config: Config, table: PolarTable, field: HeightField) -> None:
+    def __init__(self, config: Config, table: PolarTable, reference: MeanReference) -> None:
         self._config, self._most, self._unit = config, most_textures(table), config.radiometry.unit
         self._wi, self._wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
-        reference = reference_of(field, config)
         self._truth = reference.xyz(config.light, config.material, self._wi, self._wr)
         evaluate = table_evaluator(table, config.radiometry)
         self._mirrored = self._wi * [-1.0, -1.0, 1.0]

@@ -29,6 +29,6 @@ class Prepared:
     images: Iterable[Texture]
     count: int
     plan: dict[str, Any]
-    certificate: Certificate | None
+    certificate: Certificate
     loss: StorageLoss | None
     constants: dict[str, bool | int | float]

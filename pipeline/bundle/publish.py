@@ -1,13 +1,12 @@
-"""Publish: artifacts -> a folder that stands alone, named by its content and never overwritten."""
+"""The bundle as a folder that stands alone: its files are written, and it is placed under a name of its content."""
 
 import errno
-import json
 import shutil
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from pipeline.bundle import checksums, entries, layouts, material, readme
+from pipeline.bundle import checksums, entries, material, readme
 from pipeline.bundle.manifest import MANIFEST, SCHEMA_VERSION, Manifest, MapImage, TableImage
 from pipeline.bundle.prepared import Prepared
 from pipeline.bundle.verify import summary, verify
@@ -15,55 +14,57 @@ from pipeline.config.models import Config
 from pipeline.errors import DamagedError
 from pipeline.progress import Progress, silent
 from pipeline.report import images
-from pipeline.stages.validate import REPORT
 from pipeline.store import scratch
 from pipeline.store.store import Artifact, writing
 
 EVALUATOR, README = "evaluate.py", "README.md"
-TABLES, MAPS = "tables", "maps"
+TABLES, MAPS, REPORT = "tables", "maps", "report.html"
 _BESIDE = ".publishing-"
 # as pipeline.report.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
 
 
-def publish(config: Config, inputs: Mapping[str, Artifact], out: Path, progress: Progress = silent) -> Path:
-    """Writes the bundle `<name>-<version>+<digest>` under `out` and returns its folder.
+def write(
+    config: Config,
+    table: Prepared,
+    inputs: Mapping[str, Artifact],
+    report: Path,
+    folder: Path,
+    progress: Progress = silent,
+) -> str:
+    """Writes all files of a bundle into a new folder, and returns the bundle's name, `<name>-<version>+<digest>`.
 
-    inputs: the artifacts of all stages of the config, by stage. The digest is over content, so the same
-    content gives the same folder and a second time nothing is written. The folder appears by one rename.
-    Raises AccuracyError where what is to be stored would not keep its digits or its budget, DamagedError where the
-    folder stands already and is not what it was, StorageError where the disk refuses.
+    table: the table's part. inputs: the artifacts of all stages before, by stage. report: the page of `validate`.
+    The digest is over content, so the same content gives the same name.
     """
+    folder.mkdir()
+    shutil.copyfile(report, folder / REPORT)
+    _write(config, table, inputs, folder, progress)
+    digest = checksums.write(folder)
+    progress("bundle", 1.0)
+    return f"{config.name}-{config.publish.version}+{digest}"
+
+
+def place(content: Path, out: Path, name: str) -> Path:
+    """Copies a bundle to `out/name`, where it appears by one rename, and returns that folder.
+
+    A bundle that stands there already stays. Raises DamagedError where it is not what it was, StorageError where the
+    disk refuses.
+    """
+    target = out / name
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
         scratch.remove_abandoned(out, _BESIDE)
+        if target.exists():
+            _require_unharmed(target)
+            return target
         folder = scratch.make(out, _BESIDE)
         try:
-            _write(config, inputs, folder, progress)
-            digest = checksums.write(folder)
-            target = out / f"{config.name}-{config.publish.version}+{digest}"
-            _place(folder, target)
+            _copy(content, folder)
+            _move(folder, target)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-    progress("publish", 1.0)
     return target
-
-
-def published(config: Config, keys: Mapping[str, str], out: Path) -> Path | None:
-    """The bundle under `out` that was published from artifacts of these keys by this config, if it stands.
-
-    Raises DamagedError where it stands and is not what it was.
-    """
-    expected = entries.provenance(config, keys).model_dump(mode="json")
-    for page in sorted(out.glob(f"{config.name}-{config.publish.version}+*/{MANIFEST}")):
-        try:
-            found = json.loads(page.read_text(encoding="utf-8"))["provenance"]
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
-        if found == expected:
-            _require_unharmed(page.parent)
-            return page.parent
-    return None
 
 
 def _require_unharmed(bundle: Path) -> None:
@@ -75,28 +76,30 @@ def _require_unharmed(bundle: Path) -> None:
         )
 
 
-def _place(folder: Path, target: Path) -> None:
-    """Moves a finished bundle to its name; one that stands there already stays, if it is unharmed."""
+def _copy(content: Path, folder: Path) -> None:
+    """Copies all files below a folder; shutil.copytree would hide the system's error among its own."""
+    for source in sorted(content.rglob("*")):
+        target = folder / source.relative_to(content)
+        if source.is_dir():
+            target.mkdir()
+        else:
+            shutil.copyfile(source, target)
+
+
+def _move(folder: Path, target: Path) -> None:
+    """Moves a finished bundle to its name; one that another process placed there meanwhile stays, if unharmed."""
     try:
-        # a rename would replace an empty folder
-        if not target.exists():
-            folder.rename(target)
-            return
+        folder.rename(target)
     except OSError as error:
-        # somebody else published the same content meanwhile
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-    _require_unharmed(target)
+        _require_unharmed(target)
 
 
-def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:
-    """Every file but SHA256SUMS."""
-    table = layouts.prepare(config, inputs)
+def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:
+    """Writes every file but report and SHA256SUMS."""
     tables = _write_tables(table, folder, progress)
     maps = _copy_maps(inputs["render"], folder)
-    report = inputs["validate"].folder / REPORT
-    if report.is_file():
-        shutil.copyfile(report, folder / REPORT)
     found = material.medium(config)
     described = material.entry(config)
     if found is not None and described.reflectance_table is not None:
@@ -116,7 +119,7 @@ def _write(config: Config, inputs: Mapping[str, Artifact], folder: Path, progres
         precision=config.publish.precision,
         tables=tables,
         maps=maps,
-        report=REPORT if report.is_file() else None,
+        report=REPORT,
         coverage=entries.coverage(config, inputs),
         domain=entries.domain(config, inputs),
         plan=table.plan,
@@ -139,7 +142,7 @@ def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[Tab
     for image, pixels in table.images:
         images.write_rgba(folder / image.file, pixels)
         written.append(image)
-        progress("publish", 0.9 * len(written) / table.count)
+        progress("bundle", 0.9 * len(written) / table.count)
     return written
 
 

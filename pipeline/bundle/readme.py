@@ -26,9 +26,7 @@ def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
         material=manifest.material,
         reflectance=manifest.material.reflectance_table,
         certificate=certificate,
-        certified=None
-        if certificate is None
-        else next(error for error in certificate.random.colour if error.exposure_ru == certificate.exposure_ru),
+        certified=next(error for error in certificate.random.colour if error.exposure_ru == certificate.exposure_ru),
         loss=manifest.storage_loss,
         domain=manifest.domain,
         shader=shader(layout, constants).rstrip(),

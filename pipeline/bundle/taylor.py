@@ -1,15 +1,17 @@
 """The paper's tables in a bundle: one image for each I_p."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from typing import Any
 
+from pydantic import TypeAdapter
+
+from pipeline.accuracy.certificate import Certificate
 from pipeline.arrays import Array
 from pipeline.bundle import taylor_half
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
 from pipeline.report import images
-from pipeline.stages import taylor_table
-from pipeline.store.store import Artifact
 from pipeline.tables.taylor import grid
 from pipeline.tables.taylor.table import TaylorTable
 
@@ -21,15 +23,13 @@ _EVALUATION = (
     "XYZ = C cos(theta_i) sum_p w^p I_p(u, v); I_p = scale_p * (R, G, B) where A = 1; "
     "by Horner's rule from the highest p down"
 )
-_PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
 
 
-def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
-    """A Taylor table's part of a bundle.
+def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificate: dict[str, Any]) -> Prepared:
+    """Makes a Taylor table ready for a bundle.
 
-    Raises AccuracyError where half precision would lose the digits.
+    plan, certificate: of the table, for the manifest. Raises AccuracyError where half precision would lose the digits.
     """
-    table = taylor_table.load(inputs["table"])
     scale = taylor_half.scales(table, config.publish.precision)
     # measured first: it may refuse
     loss = taylor_half.measure(config, table, scale) if config.publish.precision == "half" else None
@@ -43,8 +43,8 @@ def prepare(config: Config, inputs: Mapping[str, Artifact]) -> Prepared:
         grid=entry,
         images=_images(config, table, scale, loss),
         count=len(scale),
-        plan={key: inputs["stack"].summary.get(key) for key in _PREDICTED},
-        certificate=None,
+        plan=plan,
+        certificate=TypeAdapter(Certificate).validate_python(certificate),
         loss=loss,
         constants={"POWERS": len(scale), "N": float(entry.width), "A": entry.power},
     )

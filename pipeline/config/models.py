@@ -5,10 +5,11 @@ it. `read.load` collects every fault of a file before it raises, each with its k
 looked for once each of them is sound.
 """
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from pipeline.layouts import TableSettings
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.light import Light
@@ -16,19 +17,7 @@ from pipeline.optics.material import Material
 from pipeline.optics.scene import Direction, Lights, Scene
 from pipeline.surface.source import SurfaceSource
 from pipeline.tables.polar.layout import PolarLayout
-from pipeline.tables.taylor.layout import TaylorLayout
 from pipeline.validated import Positive, Validated
-
-
-def _default_layout(table: Any) -> Any:
-    """A [table] that names no layout is polar."""
-    return {"layout": "polar", **table} if isinstance(table, dict) else table
-
-
-Table = Annotated[
-    Annotated[PolarLayout | TaylorLayout, Field(discriminator="layout")], BeforeValidator(_default_layout)
-]
-
 
 # what a polar table is planned for where no budget is set
 DEFAULT_DELTA_E = 0.1
@@ -65,7 +54,7 @@ class Config(Validated):
     coherence: Coherence = Coherence()
     light: Light = Field(default=Light(), alias="spectrum")
     material: Material = Material()
-    table: Table = PolarLayout()
+    table: TableSettings = PolarLayout()
     accuracy: Accuracy = Accuracy()
     scene: Scene | None = None
     render: Render = Render()

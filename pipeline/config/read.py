@@ -6,11 +6,11 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
+from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.errors import ConfigError
 from pipeline.surface.recipes.parameters import Recipe
 
-_LAYOUTS = ("polar", "taylor")
 _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
 
 
@@ -102,7 +102,7 @@ def _fault(error: Any) -> tuple[str, str]:
         return key, f"expected a section (a table of keys), got {_shortened(error['input'])}"
     if error["type"].startswith("union_tag"):
         called = str(error["ctx"]["discriminator"]).strip("'")
-        kinds = _KINDS if called == "kind" else _LAYOUTS
+        kinds = _KINDS if called == "kind" else layouts.NAMES
         return key, f"expected a {called}, one of {', '.join(kinds)}, got {_shortened(error['input'])}"
     message = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "value_error":
@@ -116,6 +116,6 @@ def _shortened(value: Any) -> str:
 
 
 def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:
-    types = {"float", "str", "int", "LaserLine", *_KINDS, *_LAYOUTS}
+    types = {"float", "str", "int", "LaserLine", *_KINDS, *layouts.NAMES}
     shapes = ("tuple[", "literal[", "constrained-", "function-")
     return loc.index(part) > 0 and (part in types or part.startswith(shapes))

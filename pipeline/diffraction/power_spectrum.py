@@ -49,6 +49,11 @@ class PolarPowerSpectrum:
     band_per_um: tuple[float, float]
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of E."""
+        return self.values.nbytes
+
+    @property
     def s_per_um(self) -> Array:
         """The nodes in s = 2 pi |w| / lambda, 1/um."""
         return s_nodes(self.values.shape[2], self.s_max_per_um)

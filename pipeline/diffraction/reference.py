@@ -156,6 +156,11 @@ class MeanReference:
         self.fields, self._sigma_um, self._lambda_min_nm, self._progress = fields, sigma_um, lambda_min_nm, progress
         self.first = Reference(fields[0], sigma_um, lambda_min_nm, progress)
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the height fields and of the one reference that stays in memory."""
+        return self.first.stored_bytes + sum(field.nbytes for field in self.fields)
+
     def xyz(self, light: Light, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return self._mean(lambda each: each.xyz(light, material, wi, wr, progress=progress))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline import layouts
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.optics import geometry
@@ -12,7 +13,6 @@ from pipeline.optics.colour_error import pixels
 from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images
-from pipeline.stages import table
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.tables.evaluate import Map, render_map, table_evaluator
 
@@ -41,7 +41,7 @@ def map_radius(config: Config) -> float:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    evaluate = table_evaluator(table.load(config, inputs["table"]), config.radiometry)
+    evaluate = table_evaluator(layouts.of(config.table).load(inputs["table"]), config.radiometry)
     views, unit = Map(config.render.size, map_radius(config)), config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):
@@ -54,4 +54,4 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}
 
 
-RENDER = Stage("render", 2, ("table",), _parameters, _produce)
+RENDER = Stage("render", 2, ("table",), _parameters, _produce, uses_device=True)

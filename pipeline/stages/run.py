@@ -1,32 +1,30 @@
 """The order of stages: what a config needs (the plan, a pure function) and doing it."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.diffraction.device import require_device
 from pipeline.progress import Progress, silent
-from pipeline.stages import provenance, table, validate
-from pipeline.stages.power_spectrum import POWER_SPECTRUM
+from pipeline.stages import bundle, provenance, validate
 from pipeline.stages.render import RENDER
-from pipeline.stages.stack import STACK
-from pipeline.stages.stage import Stage
+from pipeline.stages.session import Session
+from pipeline.stages.stage import Inputs, Stage
 from pipeline.stages.surface import SURFACE
 from pipeline.store.store import Artifact, Store
-from pipeline.tables.polar.layout import PolarLayout
 
 UNCHANGED = "nothing it reads has changed"
-_ON_DEVICE = {"power_spectrum", "table", "render", "validate"}
 
 
 def stages(config: Config) -> tuple[Stage, ...]:
-    """Every stage of a config, in order: a table of either layout is made of its own transform of the surface."""
-    before = POWER_SPECTRUM if isinstance(config.table, PolarLayout) else STACK
-    return (SURFACE, before, table.stage_of(config), RENDER, validate.stage_of(config))
+    """Every stage of a config, in order: a layout has its own transform of the surface and its own table."""
+    layout = layouts.of(config.table)
+    return (SURFACE, layout.transform, layout.table, RENDER, validate.stage_of(layout), bundle.stage_of(layout))
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Explanation:
     cost: str
 
 
-def plan(config: Config, store: Store, until: str = "validate") -> list[Step]:
+def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
     """The steps up to and including stage `until`, each cached or to do. Writes nothing."""
     keys: dict[str, str] = {}
     needed = _needed(config, until)
@@ -91,13 +89,14 @@ def execute(
     `on_step` hears of each step: the seconds it took, None where it was cached.
     """
     keys = {step.stage.name: step.key for step in steps}
-    if any(step.stage.name in _ON_DEVICE and not step.cached for step in steps):
+    if any(step.stage.uses_device and not step.cached for step in steps):
         # better now than after the minutes before the first kernel; drivers answer as slowly as zarr is imported
         with ThreadPoolExecutor(1) as beside:
             answer = beside.submit(require_device)
             import_module("zarr")
             answer.result()
     opened: dict[str, Artifact] = {}
+    session = Session()
     for step in steps:
         name, seconds = step.stage.name, None
         if store.has(name, step.key):
@@ -109,7 +108,8 @@ def execute(
                     started = time.perf_counter()
                     for needed in set(step.stage.inputs) - set(opened):
                         opened[needed] = store.open(needed, keys[needed])
-                    _make(config, step, {needed: opened[needed] for needed in step.stage.inputs}, store, progress)
+                    artifacts = {needed: opened[needed] for needed in step.stage.inputs}
+                    _make(config, step, Inputs(artifacts, session), store, progress)
                     # its files were hashed as they were written
                     opened[name] = store.describe(name, step.key)
                     seconds = time.perf_counter() - started
@@ -118,20 +118,20 @@ def execute(
     return {name: store.describe(name, key) for name, key in keys.items()}
 
 
-def _make(config: Config, step: Step, inputs: Mapping[str, Artifact], store: Store, progress: Progress) -> None:
+def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress) -> None:
     stage = step.stage
     record: dict[str, Any] = {
         "name": config.name,
         "version": stage.version,
         "parameters": stage.parameters(config),
-        "inputs": {name: artifact.key for name, artifact in inputs.items()},
+        "inputs": {name: artifact.key for name, artifact in inputs.artifacts.items()},
     }
     with store.create(stage.name, step.key, record) as (folder, whole):
         started = time.perf_counter()
         whole["summary"] = stage.produce(config, inputs, folder, progress)
         whole["provenance"] = {
             **provenance.versions(),
-            **(provenance.device() if stage.name in _ON_DEVICE else {}),
+            **(provenance.device() if stage.uses_device else {}),
             "seconds": round(time.perf_counter() - started, 3),
         }
 
@@ -172,9 +172,10 @@ def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
     """The work in the stage's own units, and how long it took the last time."""
     texts = {
         "power_spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
-        "table": table.size_of(config),
+        "table": layouts.of(config.table).size(config),
         "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
         "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",
+        "bundle": "tables, maps and report",
     }
     parts = [texts[stage.name]] if stage.name in texts else []
     if last is not None:

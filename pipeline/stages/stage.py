@@ -1,17 +1,33 @@
 """What every stage is: a pure function from config sections and input artifacts to one artifact."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pipeline.config.models import Config
 from pipeline.progress import Progress
+from pipeline.stages.session import Session
 from pipeline.store import digest
 from pipeline.store.store import Artifact
 
-Inputs = Mapping[str, Artifact]
 Summary = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The artifacts that a stage reads, by stage, and the objects that stages of this run have in memory."""
+
+    artifacts: Mapping[str, Artifact]
+    session: Session = field(default_factory=Session)
+
+    def __getitem__(self, stage: str) -> Artifact:
+        return self.artifacts[stage]
+
+    def summary(self, stage: str) -> Summary:
+        """What a stage recorded of its artifact."""
+        found: Summary = self.artifacts[stage].summary
+        return found
 
 
 @dataclass(frozen=True)
@@ -22,6 +38,7 @@ class Stage:
     inputs: names of the stages whose artifacts it reads.
     parameters: everything it reads from the config, as JSON; with the input keys, it addresses the artifact.
     produce: writes the artifact's files into a folder and returns its summary (JSON).
+    uses_device: whether it launches kernels.
     """
 
     name: str
@@ -29,6 +46,7 @@ class Stage:
     inputs: tuple[str, ...]
     parameters: Callable[[Config], dict[str, Any]]
     produce: Callable[[Config, Inputs, Path, Progress], Summary]
+    uses_device: bool = False
 
     def key(self, config: Config, input_keys: Mapping[str, str]) -> str:
         """The artifact's address."""

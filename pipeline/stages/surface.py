@@ -4,7 +4,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pipeline.accuracy import exact
 from pipeline.config.models import Config
+from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import InputError
 from pipeline.progress import Progress
 from pipeline.stages.stage import Inputs, Stage, Summary
@@ -95,6 +97,16 @@ def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: flo
             f"and the seams between them hold {100 * statistics.seam_energy:.2g} % of the heights' energy"
         )
     return found
+
+
+def of(inputs: Inputs) -> HeightField:
+    """The height field that a stage is given."""
+    return inputs.session.get("height field", lambda: load(inputs["surface"]))
+
+
+def reference_of(config: Config, inputs: Inputs, progress: Progress) -> MeanReference:
+    """The exact reference of the height field that a stage is given: table, validation and bundle share it."""
+    return inputs.session.get("reference", lambda: exact.reference_of(of(inputs), config, progress))
 
 
 def load(artifact: Artifact) -> HeightField:

@@ -6,17 +6,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipeline.accuracy import checks as validation
-from pipeline.accuracy import convergence
-from pipeline.accuracy.exact import reference_of
+from pipeline import layouts
+from pipeline.accuracy import checks, convergence
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference
 from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
-from pipeline.stages import power_spectrum, render, stack, surface, table
+from pipeline.stages import render, surface
+from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
-from pipeline.tables.evaluate import Evaluator, table_evaluator
-from pipeline.tables.taylor.layout import TaylorLayout
+from pipeline.tables.evaluate import table_evaluator
 
 REPORT = "report.html"
 
@@ -49,24 +47,25 @@ def _measured(
     config: Config, inputs: Inputs, drawing: Executor, progress: Progress
 ) -> tuple[Summary, dict[str, Future[bytes]]]:
     """The numbers of the summary, and the pictures by name as `drawing` makes them."""
-    field = surface.load(inputs["surface"])
+    field, layout = surface.of(inputs), layouts.of(config.table)
     drawn = {"surface": drawing.submit(_picture, "height_map", field)}
-    evaluate = table_evaluator(table.load(config, inputs["table"]), config.radiometry)
-    reference = reference_of(field, config, progress)
+    evaluate = table_evaluator(layout.load(inputs["table"]), config.radiometry)
+    reference = surface.reference_of(config, inputs, progress)
     radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
     first = render.light_direction(config.render.lights[0])
-    study = _study(config, inputs, evaluate, convergence.CoarseMap(reference, config, first, radius))
-    curves = _curves(study.curves(inputs["table"].summary["wavelengths"] > 1), progress)
+    study = layout.study(config, inputs, evaluate, convergence.CoarseMap(reference, config, first, radius))
+    curves = _curves(study, progress)
     drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
     maps: list[dict[str, Any]] = []
     for light in config.render.lights:
         towards, named = render.light_direction(light), f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
-        check = validation.check_map(evaluate, reference, config, towards, radius, progress)
+        check = checks.check_map(evaluate, reference, config, towards, radius, progress)
         picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
         drawn[f"comparison_{render.map_name(light)}"] = picture
         maps.append({**light.model_dump(), "colour": [asdict(error) for error in check.colour]})
     results: Summary = {
-        **_on_random_directions(config, inputs, evaluate, reference, progress),
+        # the certificate has both already
+        **{name: inputs.summary("table")["certificate"][name] for name in ("reference", "random")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
@@ -78,32 +77,6 @@ def _picture(of: str, *arguments: Any) -> bytes:
     """A plot by its function's name; matplotlib takes as long to import as a plot to draw, and only here."""
     png: bytes = getattr(import_module("pipeline.accuracy.plots"), of)(*arguments)
     return png
-
-
-def _on_random_directions(
-    config: Config, inputs: Inputs, evaluate: Evaluator, reference: MeanReference, progress: Progress
-) -> Summary:
-    """`random`, the table's errors on random directions, and `reference`, the reference's against sums over samples.
-
-    A table that comes with a certificate was put to the very same two checks for it.
-    """
-    certified = inputs["table"].summary.get("certificate")
-    if certified is not None:
-        return {name: certified[name] for name in ("reference", "random")}
-    return {
-        "reference": asdict(validation.check_reference(reference.fields[0], reference.first, config)),
-        "random": asdict(validation.check_random(evaluate, reference, config, progress)),
-    }
-
-
-def _study(
-    config: Config, inputs: Inputs, evaluate: Evaluator, coarse: convergence.CoarseMap
-) -> convergence.TaylorStudy | convergence.PolarStudy:
-    """What there is to vary in a config's layout."""
-    if isinstance(config.table, TaylorLayout):
-        return convergence.TaylorStudy(stack.load(inputs["stack"]), config.table, evaluate, coarse)
-    power, layout = inputs["power_spectrum"], power_spectrum.layout_of(config)
-    return convergence.PolarStudy(power_spectrum.load(power), power_spectrum.planned(power), layout, evaluate, coarse)
 
 
 def _curves(study: convergence.Study, progress: Progress) -> list[convergence.Curve]:
@@ -122,7 +95,7 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
     return {"delta_e": asked, "exposure_ru": exposure, "measured": measured, "met": met}
 
 
-def stage_of(config: Config) -> Stage:
-    """Validation of either layout: it reads what the table was made of, too."""
-    before = "stack" if isinstance(config.table, TaylorLayout) else "power_spectrum"
-    return Stage("validate", 3, ("surface", before, "table", "render"), _parameters, _produce)
+def stage_of(layout: Layout) -> Stage:
+    """Validation of a layout: it reads what the table was made of, too."""
+    inputs = ("surface", layout.transform.name, "table", "render")
+    return Stage("validate", 4, inputs, _parameters, _produce, uses_device=True)

@@ -1,18 +1,14 @@
 """The validation report: what was baked, how it looks, and how far it is from the truth."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
+from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.report import template
-from pipeline.store.store import Artifact
+from pipeline.stages.stage import Inputs
 
 Rows = list[list[str]]
-_STUDIED = {
-    "polar": "Azimuths are thinned; the step is one for all rings, beside the mean of those chosen ring by ring.",
-    "taylor": "Terms and step are varied at the views themselves, without a grid between.",
-}
 
 
 ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max")
@@ -64,52 +60,10 @@ def _cleaning_rows(done: dict[str, Any]) -> Rows:
     return rows
 
 
-def _settings_rows(before: dict[str, Any], table: dict[str, Any]) -> Rows:
-    """What the table is made of; `before` is the summary of its stack or power spectrum."""
-    return _polar_rows(before, table) if table["layout"] == "polar" else _taylor_rows(before, table)
-
-
-def _polar_rows(power_spectrum: dict[str, Any], table: dict[str, Any]) -> Rows:
-    rings, azimuths, certificate = table["rings"], table["azimuths"], table["certificate"]
-    return [
-        ["Chebyshev terms, nodes in s", f"{power_spectrum['terms']}, {power_spectrum['s_nodes']}"],
-        ["windows averaged, contrast left", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
-        ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
-        ["rings even below ρ =", f"{rings['r0']:.3g}"],
-        [
-            "azimuths crowd by, about",
-            f"{1.0 / azimuths['stretch']:.2f}, {math.degrees(azimuths['axis_rad']):.0f}°",
-        ],
-        ["terms in |w|", str(table["w_terms"])],
-        ["wavelengths a ring", f"{table['wavelengths_mean']:.0f} on average, {table['wavelengths']} at most"],
-        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
-        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
-        [
-            f"certificate: mean ΔE at {certificate['exposure_ru']:g} RU",
-            f"{certificate['measured']:.3f} of {certificate['delta_e']:g} allowed",
-        ],
-    ]
-
-
-def _taylor_rows(stack: dict[str, Any], table: dict[str, Any]) -> Rows:
-    n = table["resolution"]
-    return [
-        ["Taylor order N", str(stack["order"])],
-        ["tables I_p (p = 0..2N)", f"{table['powers_of_w']} of {n} × {n}, exponent a = {table['power']:g}"],
-        ["wavelengths", str(table["wavelengths"])],
-        ["window reach (coefficients)", "±{} × ±{}".format(*stack["window_reach"])],
-        ["predicted error of |P|²", f"{stack['predicted_error']:.1e}"],
-        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
-        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
-    ]
-
-
-def build(
-    config: Config, inputs: Mapping[str, Artifact], results: dict[str, Any], pictures: Mapping[str, bytes]
-) -> str:
+def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Mapping[str, bytes]) -> str:
     """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
-    surface, table, render = (inputs[name].summary for name in ("surface", "table", "render"))
-    before = next(inputs[name].summary for name in ("stack", "power_spectrum") if name in inputs)
+    surface, table, render = (inputs.summary(name) for name in ("surface", "table", "render"))
+    layout = layouts.of(config.table)
     return template.html(
         "pipeline.report",
         "validation.html.in",
@@ -119,12 +73,12 @@ def build(
         exposure_ru=config.render.exposure_ru,
         maps=[((inputs["render"].folder / light["png"]).read_bytes(), light) for light in render["maps"]],
         surface=_surface_rows(surface),
-        settings=_settings_rows(before, table),
+        settings=layout.settings(inputs.summary(layout.transform.name), table),
         error_columns=ERROR_COLUMNS,
         errors=error_rows(results),
         relative_errors=_relative_error_rows(results),
         pictures=pictures,
-        studied=_STUDIED[table["layout"]],
+        studied=layout.study_remark,
     )
 
 

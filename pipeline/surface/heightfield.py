@@ -18,6 +18,11 @@ class HeightField:
     pitch_um: tuple[float, float]
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of the heights."""
+        return self.heights_um.nbytes
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Samples as (ny, nx)."""
         ny, nx = self.heights_um.shape

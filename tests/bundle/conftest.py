@@ -1,5 +1,7 @@
 """Small bakes of either layout, made once: a sinusoid's artifacts in a store of the test session."""
 
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +10,8 @@ import pytest
 from pipeline.config.models import Config
 from pipeline.config.read import parse
 from pipeline.progress import silent
-from pipeline.stages import run
+from pipeline.stages import bundle, run
+from pipeline.stages.stage import Inputs
 from pipeline.store.store import Artifact, Store
 
 LAYOUTS = ("taylor", "polar")
@@ -47,12 +50,12 @@ class Baker:
 
     def __call__(self, config: Config) -> dict[str, Artifact]:
         made: dict[str, Artifact] = {}
-        *baked, validate = run.stages(config)
+        *baked, validate, _ = run.stages(config)
         for stage in baked:
             key = stage.key(config, {name: artifact.key for name, artifact in made.items()})
             if not self._store.has(stage.name, key):
                 with self._store.create(stage.name, key, {"version": stage.version}) as (folder, record):
-                    record["summary"] = stage.produce(config, made, folder, silent)
+                    record["summary"] = stage.produce(config, Inputs(made), folder, silent)
                     record["provenance"] = {
                         "numpy": "2.0.0",
                         "device": "a device",
@@ -69,6 +72,14 @@ class Baker:
                 (folder / "report.html").write_text("<p>measured</p>", encoding="utf-8")
                 record["summary"] = {"random": {"power": {"median": 1e-3}}}
         return self._store.open("validate", key)
+
+
+def publish(config: Config, artifacts: Mapping[str, Artifact], out: Path) -> Path:
+    """The bundle of these artifacts, made by its stage and placed under `out`."""
+    *_, stage = run.stages(config)
+    with tempfile.TemporaryDirectory() as folder:
+        summary = stage.produce(config, Inputs(artifacts), Path(folder), silent)
+        return bundle.place(Artifact(Path(folder), {"summary": summary}), out)
 
 
 @pytest.fixture(scope="session")

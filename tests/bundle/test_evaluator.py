@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline import layouts
 from pipeline.arrays import Array
 from pipeline.bundle import evaluator, material
 from pipeline.bundle.polar import grid_entry
-from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import open_bundle
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, Rings
@@ -20,12 +20,11 @@ from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
 from pipeline.optics import brdf, geometry
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.stages import table as table_stage
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar.compression import whole
 from pipeline.tables.polar.table import PolarTable
 
-from .conftest import LAYOUTS, SCENE, Baker, small
+from .conftest import LAYOUTS, SCENE, Baker, publish, small
 
 MODELS = list(
     itertools.product(("none", "schlick", "dielectric", "conductor"), ("relative", "absolute"), (True, False))
@@ -36,7 +35,7 @@ SEED = 3
 def both(bake: Baker, config: Config, out: Path, wi: Array, wr: Array) -> tuple[Array, Array]:
     """XYZ by the bundle's page and by the tool, as shares of what a mirror gives."""
     inputs = bake(config)
-    expected = table_evaluator(table_stage.load(config, inputs["table"]), config.radiometry)(wi, wr)
+    expected = table_evaluator(layouts.of(config.table).load(inputs["table"]), config.radiometry)(wi, wr)
     found = open_bundle(publish(config, inputs, out)).xyz(wi, wr)
     mirror = config.radiometry.mirror_luminance(wi, wr)[:, None]
     return found / mirror, expected / mirror

@@ -12,15 +12,16 @@ from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import polar_storage
 from pipeline.bundle.manifest import Manifest, PolarGrid, PolarLoss
-from pipeline.bundle.publish import publish, published
 from pipeline.bundle.verify import open_bundle, verify
+from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, ConfigError
 from pipeline.optics.colour_error import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
-from pipeline.stages import polar_table
+from pipeline.stages import run
+from pipeline.stages.polar import table as polar_table
 from pipeline.tables.evaluate import table_evaluator
 
-from .conftest import SCENE, Baker, small
+from .conftest import SCENE, Baker, publish, small
 from .test_publish import manifest_of
 
 # between what the table itself keeps and what one texture of it keeps
@@ -88,20 +89,23 @@ def test_the_manifest_tells_certificate_plan_and_stages(bake: Baker, bundle: Pat
 
 def test_the_readme_shows_the_certificate_and_its_own_numbers(bundle: Path) -> None:
     text, told = (bundle / "README.md").read_text(encoding="utf-8"), manifest_of(bundle)
-    assert told.certificate is not None
-    assert f"keeps {told.certificate.measured:.3g}" in text
+    assert f"RU is {told.certificate.measured:.3g}" in text
     for name, value in (("RINGS", 40), ("AZIMUTHS", 192), ("TEXTURES", 9), ("TERMS", 12)):
         assert f"const int {name} = {value};" in text
     for name, number in (("R0", grid_of(told).r0), ("STEP", grid_of(told).step)):
         assert f"const float {name} = {number!r};" in text
 
 
-def test_a_standing_bundle_is_found_again(bake: Baker, bundle: Path) -> None:
-    config = small("polar")
-    keys = {name: artifact.key for name, artifact in bake(config).items()}
-    assert published(config, keys, bundle.parent) == bundle
-    assert published(config, {**keys, "table": "another"}, bundle.parent) is None
-    assert published(small("polar", publish={"textures": 2}), keys, bundle.parent) is None
+def test_the_address_of_a_bundle_is_that_of_its_content(bake: Baker) -> None:
+    keys = {name: artifact.key for name, artifact in bake(small("polar")).items()}
+
+    def address(config: Config, inputs: dict[str, str]) -> str:
+        return run.stages(config)[-1].key(config, inputs)
+
+    same = address(small("polar"), keys)
+    assert address(small("polar"), keys) == same
+    assert address(small("polar"), {**keys, "table": "another"}) != same
+    assert address(small("polar", publish={"textures": 2}), keys) != same
 
 
 @pytest.mark.parametrize(

@@ -14,16 +14,15 @@ import pytest
 
 from pipeline.bundle import checksums
 from pipeline.bundle.manifest import Manifest, TaylorGrid
-from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
 from pipeline.optics import validity
 from pipeline.report import images
-from pipeline.stages import taylor_table
+from pipeline.stages.taylor import table as taylor_table
 from pipeline.surface.statistics import Period
 from pipeline.tables.taylor import grid
 
-from .conftest import SCENE, Baker, small
+from .conftest import SCENE, Baker, publish, small
 
 
 def manifest_of(folder: Path) -> Manifest:

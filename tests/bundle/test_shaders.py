@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 from pipeline.bundle import readme
-from pipeline.bundle.publish import publish
 
-from .conftest import LAYOUTS, Baker, small
+from .conftest import LAYOUTS, Baker, publish, small
 
 COMPILER = "glslangValidator"
 needs_compiler = pytest.mark.skipif(

@@ -9,16 +9,15 @@ import pytest
 
 from pipeline.bundle import taylor_half
 from pipeline.bundle.manifest import TaylorLoss
-from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.random_directions import random_pairs
-from pipeline.stages import taylor_table
+from pipeline.stages.taylor import table as taylor_table
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor.table import TaylorTable
 
-from .conftest import Baker, small
+from .conftest import Baker, publish, small
 from .test_publish import manifest_of
 
 HALF = {"precision": "half"}

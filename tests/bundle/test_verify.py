@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from pipeline.bundle import checksums
-from pipeline.bundle.publish import publish
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import DamagedError
 from pipeline.report import images
 
-from .conftest import LAYOUTS, Baker, small
+from .conftest import LAYOUTS, Baker, publish, small
 
 FIRST = {"taylor": "tables/I_00.exr", "polar": "tables/T_00.exr"}
 

@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from pipeline import layouts
 from pipeline.accuracy.exact import reference_evaluator
 from pipeline.arrays import Array
 from pipeline.config.models import Accuracy, Config
@@ -15,7 +16,7 @@ from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour_error import delta_e
 from pipeline.optics.random_directions import random_pairs
-from pipeline.stages import run, surface, table
+from pipeline.stages import run, surface
 from pipeline.store.store import Store
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Mirror
@@ -46,7 +47,7 @@ def table_error(cell: Cell, field: HeightField) -> float:
         np.save(heights, field.heights_um)
         config, store = _config(cell, heights), Store(Path(folder) / "store")
         made = run.execute(config, run.plan(config, store, "table"), store)
-        baked = table.load(config, store.open("table", made["table"].key))
+        baked = layouts.of(config.table).load(store.open("table", made["table"].key))
         field = surface.load(store.open("surface", made["surface"].key))
     evaluate = table_evaluator(baked, config.radiometry)
     wi, wr = random_pairs(None, 1000, SEED)

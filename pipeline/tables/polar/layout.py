@@ -28,6 +28,11 @@ class PolarLayout(Validated):
     form: Literal["xyz", "spectral"] = "xyz"
 
     @property
+    def integral_step_nm(self) -> float | None:
+        """Step, nm, of the spectral integral; None where every ring has its own."""
+        return None
+
+    @property
     def mean_step_nm(self) -> float:
         """Step, nm, of the means over wavelength that are taken outside the spectral integral."""
         return FINE_STEP_NM

@@ -30,6 +30,11 @@ class TaylorLayout(Validated):
         return value
 
     @property
+    def integral_step_nm(self) -> float | None:
+        """Step, nm, of the spectral integral."""
+        return self.step_nm
+
+    @property
     def mean_step_nm(self) -> float:
         """Step, nm, of the means over wavelength that are taken outside the spectral integral: the integral's own."""
         return self.step_nm

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from pipeline.accuracy import certificate
-from pipeline.accuracy.exact import reference_of
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
-from pipeline.stages import power_spectrum, surface
+from pipeline.stages import surface
+from pipeline.stages.polar import power_spectrum
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
@@ -33,7 +33,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    power = power_spectrum.load(inputs["power_spectrum"])
+    power = power_spectrum.of(inputs)
     plan = power_spectrum.planned(inputs["power_spectrum"])
     bake = plan.bake(config.radiometry, power_spectrum.budget(config), power_spectrum.layout_of(config))
     rules = bake.rules(plan.rings.rho())
@@ -41,10 +41,10 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     progress("table", 1.0)
     light = config.radiometry.illumination(config.table.mean_step_nm)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light)
-    field = surface.load(inputs["surface"])
-    reference = reference_of(field, config)
+    reference = surface.reference_of(config, inputs, progress)
     certified = certificate.certify(table_evaluator(table, config.radiometry), reference, config, progress)
-    spectral = certificate.certify_spectral(power, reference, config)
+    has_spectral_form = power_spectrum.layout_of(config).form == "spectral"
+    spectral = certificate.certify_spectral(power, reference, config) if has_spectral_form else None
     arrays.save(
         folder / _FILE,
         {
@@ -81,4 +81,4 @@ def load(artifact: Artifact) -> polar.PolarTable:
     return polar.PolarTable(arrays.load(zarr, "table"), grid)
 
 
-TABLE = Stage("table", 4, ("surface", "power_spectrum"), _parameters, _produce)
+TABLE = Stage("table", 4, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)

@@ -36,7 +36,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    field = surface.load(inputs["surface"])
+    field = surface.of(inputs)
     table = layout_of(config)
     quadrature = trapezoid(config.light, table.step_nm)
     order = None if table.terms == "auto" else table.terms
@@ -82,6 +82,11 @@ def _save(built: dft_stack.Stack, path: Path) -> None:
             "band_per_um": list(built.band_per_um),
         },
     )
+
+
+def of(inputs: Inputs) -> dft_stack.Stack:
+    """The stack that a stage is given."""
+    return load(inputs["stack"])
 
 
 def load(artifact: Artifact) -> dft_stack.Stack:

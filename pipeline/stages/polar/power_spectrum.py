@@ -24,10 +24,6 @@ from pipeline.tables.polar.layout import PolarLayout
 _FILE = "power_spectrum.zarr"
 # from the stack to tables of a power spectrum: the plan measures with them
 PLANNING_KERNELS = ("dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl")
-# By its key, the power spectrum that this process made last: table and validation take longer to read it back than to
-# use it. A large one serves the table alone, and then leaves its memory to the reference.
-_KEPT_BYTES = 2**28
-_just_made: dict[str, power_spectrum.PolarPowerSpectrum] = {}
 
 
 def layout_of(config: Config) -> PolarLayout:
@@ -62,7 +58,7 @@ def budget(config: Config) -> plan.Budget:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    fields = windows.places(surface.load(inputs["surface"]), config.coherence)
+    fields = windows.places(surface.of(inputs), config.coherence)
     layout, allowed = layout_of(config), budget(config)
     trial = plan.start(fields, config.coherence.sigma_um, config.light, config.scene, allowed, layout, progress)
     chosen = plan.choose(trial, config.scene, allowed, layout)
@@ -84,8 +80,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "band_per_um": list(built.band_per_um),
         },
     )
-    _just_made.clear()
-    _just_made[POWER_SPECTRUM.key(config, {"surface": inputs["surface"].key})] = built
+    inputs.session.keep("power spectrum", built)
     return {
         **asdict(chosen),
         "radii": len(built.radius_per_um),
@@ -102,13 +97,13 @@ def planned(artifact: Artifact) -> plan.Plan:
     return plan.Plan(azimuths=azimuths, rings=rings, **found)
 
 
+def of(inputs: Inputs) -> power_spectrum.PolarPowerSpectrum:
+    """The power spectrum that a stage is given."""
+    return inputs.session.get("power spectrum", lambda: load(inputs["power_spectrum"]))
+
+
 def load(artifact: Artifact) -> power_spectrum.PolarPowerSpectrum:
-    """The power spectrum of an artifact, from memory where this process has just made it."""
-    made = _just_made.get(artifact.key)
-    if made is not None:
-        if made.values.nbytes > _KEPT_BYTES:
-            _just_made.clear()
-        return made
+    """The power spectrum of an artifact."""
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     return power_spectrum.PolarPowerSpectrum(
@@ -128,4 +123,4 @@ def _on_a_cache_line(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return placed
 
 
-POWER_SPECTRUM = Stage("power_spectrum", 4, ("surface",), _parameters, _produce)
+POWER_SPECTRUM = Stage("power_spectrum", 4, ("surface",), _parameters, _produce, uses_device=True)

@@ -1,17 +1,21 @@
 """Table: Taylor stack, light and material -> I_p(u, v) in X, Y and Z."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
-from pipeline.stages import stack
+from pipeline.stages import surface
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
+from pipeline.stages.taylor import stack
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
+from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor import grid
 from pipeline.tables.taylor import table as taylor
 
@@ -19,19 +23,19 @@ _FILE = "table.zarr"
 
 
 def _parameters(config: Config) -> dict[str, Any]:
-    material = material_parameters(config)
     return {
-        "kernel": kernel_digest("windowed_dft.cl", "taylor_table.cl"),
+        "kernel": kernel_digest("windowed_dft.cl", "taylor_table.cl", "power_spectrum.cl"),
         "spectrum": light_parameters(config),
-        # angles stay outside the table: only what varies with wavelength enters
-        "material": {key: material[key] for key in ("normalisation", "metal")},
+        # the certificate is over colours, so all of the material counts
+        "material": material_parameters(config),
         "table": config.table.model_dump(mode="json"),
         "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+        "accuracy": config.accuracy.model_dump(mode="json"),
     }
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    built = stack.load(inputs["stack"])
+    built = stack.of(inputs)
     section = stack.layout_of(config)
     quadrature = config.radiometry.integrand(section.step_nm)
     table = taylor.build(built, quadrature, section.resolution, section.power, config.scene, progress)
@@ -48,6 +52,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {"power": table.power, "channels": ["X", "Y", "Z"]},
     )
     inside = np.hypot(nodes[:, None], nodes) <= grid.U_MAX
+    evaluate = table_evaluator(table, config.radiometry)
+    certified = certificate.measure(evaluate, surface.reference_of(config, inputs, progress), config, progress)
     return {
         "layout": "taylor",
         "resolution": table.resolution,
@@ -56,6 +62,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "wavelengths": len(quadrature.lambda_nm),
         "unknown_share": table.unknown_share,
         "skipped_share": float(1.0 - np.mean(table.computed[inside])),
+        "certificate": asdict(certified),
     }
 
 
@@ -66,4 +73,4 @@ def load(artifact: Artifact) -> taylor.TaylorTable:
     return taylor.TaylorTable(values, computed, unknown, float(arrays.attributes(zarr)["power"]))
 
 
-TABLE = Stage("table", 1, ("stack",), _parameters, _produce)
+TABLE = Stage("table", 2, ("surface", "stack"), _parameters, _produce, uses_device=True)

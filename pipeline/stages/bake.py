@@ -1,7 +1,6 @@
-"""Bake: every stage of a config, what people look at laid out beside, and its bundle."""
+"""A whole bake: every stage of a config, and its results laid out where people look."""
 
 import shutil
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,15 +8,17 @@ from typing import Any
 
 from pipeline.config.models import Config
 from pipeline.progress import Progress, silent
-from pipeline.stages import run
+from pipeline.stages import bundle, run
 from pipeline.stages.validate import REPORT
 from pipeline.store import scratch
 from pipeline.store.store import Artifact, Store, writing
 
+OnStep = Callable[[run.Step, float | None], None]
+
 
 @dataclass(frozen=True)
 class Results:
-    """What a config became: its artifacts by stage, and the files laid out, the report last."""
+    """The artifacts of a config by stage, and the files laid out: maps, then the report."""
 
     name: str
     artifacts: Mapping[str, Artifact]
@@ -35,18 +36,28 @@ class Results:
         )
 
 
-def make(
-    config: Config,
-    store: Store,
-    folder: Path,
-    progress: Progress = silent,
-    on_step: Callable[[run.Step, float | None], None] | None = None,
+def validate(
+    config: Config, store: Store, folder: Path, progress: Progress = silent, on_step: OnStep | None = None
 ) -> Results:
-    """Does every stage, and copies maps and report out of the store into `folder`.
+    """Does every stage but the bundle, and copies maps and report out of the store into `folder`.
 
-    `on_step` hears of each step, as in `run.execute`. A missed budget is no fault here: see `Results.missed_budget`.
+    on_step: as in `run.execute`. A missed budget is no fault here: see `Results.missed_budget`.
     """
-    artifacts = run.execute(config, run.plan(config, store), store, progress, on_step)
+    return _until("validate", config, store, folder, progress, on_step)
+
+
+def make(
+    config: Config, store: Store, folder: Path, progress: Progress = silent, on_step: OnStep | None = None
+) -> tuple[Results, Path]:
+    """Does every stage, copies maps, report and bundle into `folder`, and returns the bundle's folder, too."""
+    results = _until("bundle", config, store, folder, progress, on_step)
+    return results, bundle.place(store.open("bundle", results.artifacts["bundle"].key), folder)
+
+
+def _until(
+    stage: str, config: Config, store: Store, folder: Path, progress: Progress, on_step: OnStep | None
+) -> Results:
+    artifacts = run.execute(config, run.plan(config, store, stage), store, progress, on_step)
     return Results(config.name, artifacts, _lay_out(store, artifacts, folder))
 
 
@@ -57,17 +68,3 @@ def _lay_out(store: Store, artifacts: Mapping[str, Artifact], folder: Path) -> t
         for source in sources:
             shutil.copyfile(source, beside / source.name)
     return tuple(folder / source.name for source in sources)
-
-
-def publish_once(
-    config: Config, store: Store, artifacts: Mapping[str, Artifact], folder: Path, progress: Progress = silent
-) -> tuple[Path, float | None]:
-    """The bundle of these artifacts in `folder`, and the seconds it took, None where it stood already."""
-    from pipeline.bundle.publish import publish, published
-
-    standing = published(config, {name: a.key for name, a in artifacts.items()}, folder)
-    if standing is not None:
-        return standing, None
-    started = time.perf_counter()
-    opened = {name: store.open(name, artifact.key) for name, artifact in artifacts.items()}
-    return publish(config, opened, folder, progress), time.perf_counter() - started

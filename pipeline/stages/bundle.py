@@ -1,0 +1,58 @@
+"""Bundle: table, maps, validation -> the folder that renderers read, by its manifest."""
+
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pipeline import layouts
+from pipeline.config.models import Config
+from pipeline.progress import Progress
+from pipeline.stages.layout import Layout
+from pipeline.stages.stage import Inputs, Stage, Summary
+from pipeline.stages.validate import REPORT
+from pipeline.store.store import Artifact
+
+_CONTENT = "content"
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    from pipeline.bundle import entries
+
+    return {"config": entries.resolved(config), "sources": _sources_digest()}
+
+
+@cache
+def _sources_digest() -> str:
+    """The digest of all text that ships in bundles: evaluator, shaders and templates."""
+    bundle, shaders = files("pipeline.bundle"), files("kernels").joinpath("shaders")
+    sources = [bundle.joinpath("evaluator.py")]
+    for folder in (bundle.joinpath("templates"), shaders):
+        sources += sorted((file for file in folder.iterdir() if file.is_file()), key=lambda file: file.name)
+    return sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+
+
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    from pipeline.bundle import publish
+
+    table = layouts.of(config.table).prepare(config, inputs)
+    report = inputs["validate"].folder / REPORT
+    name = publish.write(config, table, inputs.artifacts, report, folder / _CONTENT, progress)
+    return {"name": name}
+
+
+def place(artifact: Artifact, out: Path) -> Path:
+    """Copies the bundle of an artifact into `out` and returns its folder; one that stands there already stays.
+
+    Raises DamagedError where it stands and is not what it was, StorageError where the disk refuses.
+    """
+    from pipeline.bundle import publish
+
+    return publish.place(artifact.folder / _CONTENT, out, artifact.summary["name"])
+
+
+def stage_of(layout: Layout) -> Stage:
+    """The bundle of a layout: its manifest tells of every stage before."""
+    inputs = ("surface", layout.transform.name, "table", "render", "validate")
+    return Stage("bundle", 1, inputs, _parameters, _produce, uses_device=True)

@@ -1,0 +1,1 @@
+"""Stages of the polar layout: power spectrum and table."""

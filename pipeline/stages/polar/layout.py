@@ -1,0 +1,76 @@
+"""The polar layout: rings and azimuths of splines, Chebyshev polynomials in |w|."""
+
+import math
+from typing import TYPE_CHECKING
+
+from pipeline.accuracy.convergence import CoarseMap, PolarStudy, Study
+from pipeline.config.models import Config
+from pipeline.progress import silent
+from pipeline.stages import surface
+from pipeline.stages.layout import Layout
+from pipeline.stages.polar import power_spectrum, table
+from pipeline.stages.stage import Inputs, Summary
+from pipeline.tables.evaluate import Evaluator
+
+if TYPE_CHECKING:
+    from pipeline.bundle.prepared import Prepared
+
+_PLANNED = ("terms", "s_nodes", "w_terms", "probed_delta_e", "windows", "speckle_contrast")
+
+
+def _size(config: Config) -> str:
+    layout = power_spectrum.layout_of(config)
+    return f"{layout.rings} rings x {layout.azimuths} azimuths"
+
+
+def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
+    """Rings, azimuths, terms in |w| and wavelength step."""
+    layout, planned = power_spectrum.layout_of(config), power_spectrum.planned(inputs["power_spectrum"])
+    has_steps = inputs.summary("table")["wavelengths"] > 1
+    return PolarStudy(power_spectrum.of(inputs), planned, layout, evaluate, coarse).curves(has_steps)
+
+
+def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
+    rings, azimuths, certificate = table["rings"], table["azimuths"], table["certificate"]
+    return [
+        ["Chebyshev terms, nodes in s", f"{power_spectrum['terms']}, {power_spectrum['s_nodes']}"],
+        ["windows averaged, contrast left", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
+        ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
+        ["rings even below ρ =", f"{rings['r0']:.3g}"],
+        [
+            "azimuths crowd by, about",
+            f"{1.0 / azimuths['stretch']:.2f}, {math.degrees(azimuths['axis_rad']):.0f}°",
+        ],
+        ["terms in |w|", str(table["w_terms"])],
+        ["wavelengths a ring", f"{table['wavelengths_mean']:.0f} on average, {table['wavelengths']} at most"],
+        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
+        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
+        [
+            f"certificate: mean ΔE at {certificate['exposure_ru']:g} RU",
+            f"{certificate['measured']:.3f} of {certificate['delta_e']:g} allowed",
+        ],
+    ]
+
+
+def _prepare(config: Config, inputs: Inputs) -> "Prepared":
+    from pipeline.bundle import polar
+
+    return polar.prepare(
+        config,
+        table.load(inputs["table"]),
+        lambda: surface.reference_of(config, inputs, silent),
+        {key: inputs.summary("power_spectrum").get(key) for key in _PLANNED},
+        inputs.summary("table")["certificate"],
+    )
+
+
+LAYOUT = Layout(
+    transform=power_spectrum.POWER_SPECTRUM,
+    table=table.TABLE,
+    load=table.load,
+    size=_size,
+    study=_study,
+    study_remark="Azimuths are thinned; the step is one for all rings, beside the mean of those chosen ring by ring.",
+    settings=_settings,
+    prepare=_prepare,
+)

@@ -1,0 +1,1 @@
+"""Stages of the layout of the paper: Taylor stack and table."""

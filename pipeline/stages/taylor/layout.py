@@ -1,0 +1,66 @@
+"""The layout of the paper: I_p(u, v) on a grid that is fine near the origin."""
+
+from typing import TYPE_CHECKING
+
+from pipeline.accuracy.convergence import CoarseMap, Study, TaylorStudy
+from pipeline.config.models import Config
+from pipeline.stages.layout import Layout
+from pipeline.stages.stage import Inputs, Summary
+from pipeline.stages.taylor import stack, table
+from pipeline.tables.evaluate import Evaluator
+
+if TYPE_CHECKING:
+    from pipeline.bundle.prepared import Prepared
+
+_PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
+
+
+def _size(config: Config) -> str:
+    layout = stack.layout_of(config)
+    return f"{layout.resolution}² nodes x {layout.step_nm:g} nm steps"
+
+
+def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
+    """Terms, wavelength step, resolution and exponent of the grid."""
+    has_steps = inputs.summary("table")["wavelengths"] > 1
+    return TaylorStudy(stack.of(inputs), stack.layout_of(config), evaluate, coarse).curves(has_steps)
+
+
+def _settings(stack: Summary, table: Summary) -> list[list[str]]:
+    n = table["resolution"]
+    return [
+        ["Taylor order N", str(stack["order"])],
+        ["tables I_p (p = 0..2N)", f"{table['powers_of_w']} of {n} × {n}, exponent a = {table['power']:g}"],
+        ["wavelengths", str(table["wavelengths"])],
+        ["window reach (coefficients)", "±{} × ±{}".format(*stack["window_reach"])],
+        ["predicted error of |P|²", f"{stack['predicted_error']:.1e}"],
+        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
+        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
+        [
+            f"certificate: mean ΔE at {table['certificate']['exposure_ru']:g} RU",
+            f"{table['certificate']['measured']:.3f}",
+        ],
+    ]
+
+
+def _prepare(config: Config, inputs: Inputs) -> "Prepared":
+    from pipeline.bundle import taylor
+
+    return taylor.prepare(
+        config,
+        table.load(inputs["table"]),
+        {key: inputs.summary("stack").get(key) for key in _PREDICTED},
+        inputs.summary("table")["certificate"],
+    )
+
+
+LAYOUT = Layout(
+    transform=stack.STACK,
+    table=table.TABLE,
+    load=table.load,
+    size=_size,
+    study=_study,
+    study_remark="Terms and step are varied at the views themselves, without a grid between.",
+    settings=_settings,
+    prepare=_prepare,
+)
