@@ -7,7 +7,7 @@ from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
 from pipeline.arrays import Array
-from pipeline.bundle import taylor_half
+from pipeline.bundle import taylor_storage
 from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
@@ -30,9 +30,9 @@ def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificat
 
     plan, certificate: of the table, for the manifest. Raises AccuracyError where half precision would lose the digits.
     """
-    scale = taylor_half.scales(table, config.publish.precision)
+    scale = taylor_storage.scales(table, config.publish.precision)
     # measured first: it may refuse
-    loss = taylor_half.measure(config, table, scale) if config.publish.precision == "half" else None
+    loss = taylor_storage.measure(config, table, scale) if config.publish.precision == "half" else None
     entry = TaylorGrid(
         layout="taylor", width=table.resolution, height=table.resolution, power=table.power, u_max=grid.U_MAX
     )
@@ -53,8 +53,8 @@ def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificat
 def _images(config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss | None) -> Iterator[Texture]:
     """tables/I_00.exr ... and their pixels."""
     stored = config.publish.precision
-    lost = None if loss is None else taylor_half.subnormal_shares(table, scale)
-    for p, plane in enumerate(taylor_half.planes(table, scale, stored)):
+    lost = None if loss is None else taylor_storage.subnormal_shares(table, scale)
+    for p, plane in enumerate(taylor_storage.planes(table, scale, stored)):
         image = TaylorImage(
             layout="taylor",
             file=f"tables/I_{p:02d}.exr",

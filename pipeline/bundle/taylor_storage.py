@@ -1,4 +1,4 @@
-"""What becomes of I_p when it is stored: a scale for each p, and what half precision costs."""
+"""How the paper's tables are stored: a scale for each I_p, and what half precision costs on random directions."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -7,7 +7,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from pipeline.bundle import taylor_half
+from pipeline.bundle import taylor_storage
 from pipeline.bundle.manifest import TaylorLoss
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError
@@ -29,7 +29,7 @@ def table(bake: Baker) -> TaylorTable:
 
 
 def test_scales_are_powers_of_two_that_fill_half(table: TaylorTable) -> None:
-    scale = taylor_half.scales(table, "half")
+    scale = taylor_storage.scales(table, "half")
     mantissa, _ = np.frexp(scale)
     assert np.all(mantissa == 0.5)
     peak = np.abs(table.values).max(axis=(0, 1, 2)) / scale
@@ -42,17 +42,17 @@ def test_scales_are_powers_of_two_that_fill_half(table: TaylorTable) -> None:
 def test_an_empty_or_vanishing_plane_has_a_scale(table: TaylorTable) -> None:
     for value in (0.0, 1e-44):
         values = np.full_like(table.values, value)
-        scale = taylor_half.scales(replace(table, values=values), "half")
+        scale = taylor_storage.scales(replace(table, values=values), "half")
         assert np.all(np.isfinite(values / scale.astype(np.float32)))
 
 
 def test_float_is_stored_as_it_is(table: TaylorTable) -> None:
-    assert np.all(taylor_half.scales(table, "float") == 1.0)
+    assert np.all(taylor_storage.scales(table, "float") == 1.0)
 
 
 def test_half_keeps_eleven_bits(table: TaylorTable) -> None:
-    scale = taylor_half.scales(table, "half")
-    error = np.abs(taylor_half.in_half(table, scale).values - table.values)
+    scale = taylor_storage.scales(table, "half")
+    error = np.abs(taylor_storage.in_half(table, scale).values - table.values)
     assert np.all(error <= np.maximum(2.0**-11 * np.abs(table.values), 2.0**-25 * scale))
 
 
@@ -64,7 +64,7 @@ def test_a_half_bundle_errs_as_it_says(bake: Baker, tmp_path: Path) -> None:
     told = manifest_of(folder)
     with OpenEXR.File(str(folder / told.tables[0].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(np.float16)}
-    wi, wr = random_pairs(None, 2000, taylor_half._SEED)
+    wi, wr = random_pairs(None, 2000, taylor_storage._SEED)
     exact = table_evaluator(taylor_table.load(inputs["table"]), config.radiometry)
     evaluate = open_bundle(folder).xyz
     mirrored = wi * [-1.0, -1.0, 1.0]
