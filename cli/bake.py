@@ -1,12 +1,14 @@
 """`run` and `plan`: what a config needs, and doing it."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from cli import console, sources
-from pipeline.config.models import Config
+
+if TYPE_CHECKING:
+    from pipeline.config.models import Config
 
 
 @click.command("run")
@@ -54,7 +56,7 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
         raise AccuracyError("\n".join(missed))
 
 
-def _bake_until(loaded: list[Config], until: str, store_root: Path | None, as_json: bool) -> None:
+def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_json: bool) -> None:
     """Only the stages up to one: what they are is told, nothing is laid out."""
     from pipeline.stages import run
 
@@ -84,7 +86,7 @@ def _certified(certificate: dict[str, Any]) -> str:
     )
 
 
-def load_all(paths: tuple[Path, ...]) -> list[Config]:
+def load_all(paths: tuple[Path, ...]) -> "list[Config]":
     """All configs, each of its own name: two of one name would write into one folder. Raises ConfigError."""
     from pipeline.errors import ConfigError
 
@@ -97,7 +99,7 @@ def load_all(paths: tuple[Path, ...]) -> list[Config]:
     return loaded
 
 
-def _bake(config: Config, out: Path, store_root: Path | None, until: str) -> tuple[dict[str, Any], str | None]:
+def _bake(config: "Config", out: Path, store_root: Path | None, until: str) -> tuple[dict[str, Any], str | None]:
     """The results of a config for machines, and a line where it missed its budget."""
     from pipeline.stages import bake
 
@@ -148,7 +150,7 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
                 click.echo(f"{step['stage']}: {step['reason']}")
 
 
-def _plan(config: Config, store: Any) -> list[dict[str, str]]:
+def _plan(config: "Config", store: Any) -> list[dict[str, str]]:
     """A row a stage."""
     from pipeline.stages import run
 

@@ -53,7 +53,8 @@ def measure(
 ) -> Certificate:
     """Measures a table against the exact reference of its height field, and the reference against plain sums.
 
-    evaluate: the table's XYZ for pairs of directions. Raises AccuracyError where the reference's two algorithms differ.
+    evaluate: the table's XYZ for pairs of directions. Raises AccuracyError where the two algorithms of the reference
+    differ.
     """
     checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(evaluate, reference, config, progress)

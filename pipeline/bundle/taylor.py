@@ -28,7 +28,7 @@ _EVALUATION = (
 def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificate: dict[str, Any]) -> Prepared:
     """Makes a Taylor table ready for a bundle.
 
-    plan, certificate: of the table, for the manifest. Raises AccuracyError where half precision would lose the digits.
+    plan, certificate: of the table, for the manifest. Raises AccuracyError where half precision would lose digits.
     """
     scale = taylor_storage.scales(table, config.publish.precision)
     # measured first: it may refuse

@@ -72,7 +72,7 @@ def test_store_list(baked: Tool) -> None:
     assert lines[0].split() == ["stage", "name", "MiB", "key"]
     assert len(lines) == 1 + 6 + 1
     assert too_wide("\n".join(lines[:-1])) == []
-    assert lines[-1].startswith("5 artifacts, ")
+    assert lines[-1].startswith("6 artifacts, ")
 
 
 def test_an_empty_store(tool: Tool) -> None:
