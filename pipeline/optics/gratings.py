@@ -1,10 +1,21 @@
-"""Gratings in closed form: where their orders leave, and how much of the light each takes.
+"""Gratings in closed form: the directions of their orders, and the share of the light that each order takes.
 
 A grating of period L along x has P(f) = c_m at f = m / L (under a window of many periods), the Fourier coefficient of
 exp(i s h) with s = k w < 0. Powers |c_m|^2 are shares of a mirror's and sum to 1 over all m at fixed s.
+
+In the plane of incidence the grating equation, [D14] eq. 13, reads sin theta_i = sin phi + m lambda / a. theta_i is
+the angle of the light to the normal. phi is the angle of the view in the same plane, positive on the mirror's side;
+the mirror direction has phi = theta_i and m = 0. With the light at azimuth phi_i,
+
+    wi = ( sin theta_i d, cos theta_i),  wr = (-sin phi d, cos phi),  d = (cos phi_i, sin phi_i),
+    (u, v) = -wi - wr = -(m lambda / a) d,
+
+so that order m of a grating of period a along d has the frequency f = (u, v) / lambda = -(m / a) d at every
+wavelength. Orders m > 0 lean back from the mirror direction towards the normal and the light.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import jv
 
 from pipeline.arrays import Array
@@ -22,6 +33,27 @@ def view_of_order(wi: Array, order: Values, lambda_over_period: Values) -> Array
     y = np.broadcast_to(-wi[..., 1], x.shape)
     rest = 1.0 - x**2 - y**2
     return np.stack([x, y, np.sqrt(np.where(rest > 0.0, rest, np.nan))], axis=-1)
+
+
+def viewing_angle(theta_i: float, period_um: ArrayLike, lambda_um: ArrayLike, order: int = 1) -> Array:
+    """phi of an order, radians; NaN where the order does not leave the surface. Periods and wavelengths broadcast."""
+    sine = np.sin(theta_i) - order * np.asarray(lambda_um, float) / np.asarray(period_um, float)
+    return np.arcsin(np.where(np.abs(sine) <= 1.0, sine, np.nan))
+
+
+def period_um(theta_i: float, phi: ArrayLike, lambda_um: ArrayLike, order: int = 1) -> Array:
+    """a = m lambda / (sin theta_i - sin phi), um; infinite in the mirror direction, order 0 of every period."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(order * np.asarray(lambda_um, float) / (np.sin(theta_i) - np.sin(phi)))
+
+
+def in_plane(theta_i: float, azimuth: float, phi: ArrayLike) -> tuple[Array, Array]:
+    """(wi, wr), (..., 3) each, of a light at (theta_i, azimuth) and views at phi (...,) in its plane, radians."""
+    phi = np.asarray(phi, float)
+    x, y = np.cos(azimuth), np.sin(azimuth)
+    wr = np.stack([-np.sin(phi) * x, -np.sin(phi) * y, np.cos(phi)], axis=-1)
+    wi = np.array([np.sin(theta_i) * x, np.sin(theta_i) * y, np.cos(theta_i)])
+    return np.broadcast_to(wi, wr.shape), wr
 
 
 def efficiency(power: Values, wi: Array, wr: Array) -> Array:

@@ -20,7 +20,7 @@ _PITCH_UM = (1e-4, 100.0)
 _RANGE_UM = (1e-6, 100.0)
 _OVERRIDE = "remove the key, or set surface.override_file_units = true"
 
-Source = Literal["file", "config"]
+Origin = Literal["file", "config"]
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class ScanRecord:
     channels: tuple[str, ...]
     shape: tuple[int, int]
     pitch_um: tuple[float, float]
-    pitch_from: Source
+    pitch_from: Origin
     um_per_unit: float
-    unit_from: Source
+    unit_from: Origin
     holes: int
 
 
@@ -105,7 +105,7 @@ def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:
         )
 
 
-def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Source], is_image: bool) -> None:
+def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Origin], is_image: bool) -> None:
     found = float(np.nanmax(heights_um) - np.nanmin(heights_um))
     if found == 0.0:
         raise fault(
@@ -131,7 +131,7 @@ def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, 
 
 def _units(
     file: str, scan: Scan, surface: SurfaceSource
-) -> tuple[tuple[float, Source], tuple[tuple[float, float], Source]]:
+) -> tuple[tuple[float, Origin], tuple[tuple[float, float], Origin]]:
     """(um per stored unit, its source) and (pitch in um, its source); every missing key in one error."""
     unit = _unit(file, scan, surface)
     pitch = _pitch(file, scan, surface)
@@ -147,7 +147,7 @@ def _units(
     raise fault(file, "units", f"a file ({scan.format}) that does not state them", f"set {' and '.join(missing)}")
 
 
-def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Source] | None:
+def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Origin] | None:
     if scan.full_code is not None:
         return _unit_of_image(file, scan.full_code, surface)
     if surface.height_range_um is not None:
@@ -164,7 +164,7 @@ def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Source]
     raise fault(file, "units that agree", f"{found} ({told:g} um)", _OVERRIDE)
 
 
-def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple[float, Source] | None:
+def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple[float, Origin] | None:
     if surface.height_unit is not None:
         found = f"surface.height_unit = '{surface.height_unit}', but an image holds codes 0..{full_code:g}"
         raise fault(file, "a height range", found, "set surface.height_range_um instead")
@@ -173,7 +173,7 @@ def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple
     return surface.height_range_um / full_code, "config"
 
 
-def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Source] | None:
+def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Origin] | None:
     told = None if surface.pitch_um is None else as_pair(surface.pitch_um)
     if scan.pitch_um is None:
         return None if told is None else (told, "config")

@@ -11,7 +11,7 @@ from pipeline.config.models import Config
 from pipeline.errors import ConfigError
 from pipeline.optics import colour_data
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.statistics import dominant_periods
+from pipeline.surface.periods import dominant_periods
 
 # [G04]'s text has eight orders, its listing's loop n = 1 .. 7
 PUBLISHED_ORDERS = 8
