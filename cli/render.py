@@ -33,7 +33,7 @@ def render_command(
     A map shows every view of one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files go
     to OUT/NAME as EXR (linear XYZ, 1 RU) and PNG.
     """
-    from pipeline.optics.colour_error import pixels
+    from pipeline.optics.colour import pixels
     from pipeline.optics.scene import Direction
     from pipeline.report import images
     from pipeline.stages import render

@@ -15,7 +15,7 @@ from pipeline.bundle.manifest import PolarLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import ColourError, delta_e
+from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator

@@ -15,7 +15,7 @@ from pipeline.bundle.manifest import Manifest, PolarGrid, PolarLoss
 from pipeline.bundle.publish import publish, published
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError, ConfigError
-from pipeline.optics.colour_error import ColourError, delta_e
+from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import polar_table
 from pipeline.tables.evaluate import table_evaluator
