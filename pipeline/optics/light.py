@@ -14,7 +14,7 @@ from pipeline.optics.csv_columns import read_columns, shipped
 from pipeline.validated import Pair, Validated, existing_file, is_csv
 
 # the wavelengths, nm, that the CIE's observers of 1931 and 1964 cover
-SHORTEST_NM, LONGEST_NM = 360.0, 830.0
+SHORTEST_NM, LONGEST_NM = 360, 830
 # the step, nm, at which integrals over wavelength have converged: docs/accuracy.md
 FINE_STEP_NM = 1.0
 # columns of data/illuminants.csv; other names are looked up in colour-science, whose import takes 1.5 s
