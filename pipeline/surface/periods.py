@@ -1,4 +1,4 @@
-"""The strongest periods of a height field: lobes of its power spectrum, found by mean shift."""
+"""The strongest periods of a height field: the lobes of its power spectrum, found by mean shift."""
 
 from dataclasses import dataclass
 from math import atan2, degrees, log, pi
@@ -11,23 +11,24 @@ from pipeline.arrays import Array
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 
-# a period must repeat this often across the patch to be told from waviness
+# fewer repeats across the patch cannot be distinguished from waviness
 _FEWEST_REPEATS = 4.0
-# of a lobe's frequency: the kernel that finds its middle, and the radius whose power is its share; never
-# less than these numbers of bins, in which the window spreads even a single line
+# width of the smoothing kernel and radius of a lobe, as shares of the lobe's frequency; and their least values in
+# bins, because the window spreads even a single line over some bins
 _KERNEL, _KERNEL_BINS = 1 / 6, 1.0
 _RADIUS, _RADIUS_BINS = 1 / 6, 3.0
-# power per bin over that of its ring; noise without a direction stays below
+# least power per bin, relative to the mean on the ring of the same |f|; isotropic noise remains below
 _LEAST_CONTRAST = 5.0
+# least share of the variance
 _LEAST_SHARE = 0.005
 
 
 @dataclass(frozen=True)
 class Period:
-    """One line or lobe of the height's power spectrum.
+    """One line or lobe of the height's power spectrum, at a frequency f.
 
-    period_um: 1 / |f|; direction_deg: azimuth of the frequency vector from +x, in (-90, 90].
-    share: part of the height's variance in the lobe.
+    period_um: 1 / |f|, um. direction_deg: azimuth of f from +x, degrees, in (-90, 90].
+    share: share of the heights' variance in the lobe.
     """
 
     period_um: float
@@ -37,7 +38,11 @@ class Period:
 
 @dataclass(frozen=True)
 class _HeightSpectrum:
-    """Power (variance a bin) of a windowed field on centred frequencies fx (mx,), fy (my,), 1/um."""
+    """The power spectrum of a windowed height field.
+
+    power: variance per bin (my, mx). fx (mx,), fy (my,): frequencies, 1/um, ascending through 0.
+    bin_per_um: distance of the frequencies along (x, y), 1/um. variance: sum of the power over all frequencies.
+    """
 
     power: Array
     fx: Array
@@ -47,12 +52,15 @@ class _HeightSpectrum:
 
 
 def dominant_periods(field: HeightField, highest_per_um: float, count: int = 4) -> tuple[Period, ...]:
-    """The strongest lobes of the height's power spectrum, at most `count`, by falling share of variance.
+    """Finds the strongest lobes of the height's power spectrum.
 
-    A lobe is a mode of the spectrum smoothed over a sixth of its frequency, so the many speckles that
-    disorder makes of one line count as one; its middle is a mean-shift fixed point, which for a single line
-    is exact far below a bin. Left out: frequencies above `highest_per_um`, fewer than four repeats across
-    the patch, lobes below 0.5 % of the variance, and those hardly above their own ring.
+    A lobe is a mode of the spectrum smoothed over a sixth of its frequency, so that the speckles into which disorder
+    splits a line count as one lobe. Its centre is a fixed point of mean shift, which locates a single line to a small
+    fraction of a bin. Lobes with fewer than four repeats across the patch, with less than 0.5 % of the variance, or
+    hardly brighter than other azimuths of the same |f| are omitted.
+
+    field: without holes. highest_per_um: the highest frequency of interest, 1/um. count: the most periods to return.
+    Returns the periods by falling share of the variance.
     """
     spectrum = _spectrum(field, highest_per_um)
     if spectrum.variance == 0:
@@ -73,7 +81,7 @@ def dominant_periods(field: HeightField, highest_per_um: float, count: int = 4) 
 
 
 def _repeats(spectrum: _HeightSpectrum, frequency: complex) -> float:
-    """How often a frequency repeats across the patch."""
+    """Computes how often a frequency repeats across the patch."""
     return abs(complex(frequency.real / spectrum.bin_per_um[0], frequency.imag / spectrum.bin_per_um[1]))
 
 
@@ -89,13 +97,13 @@ def _is_known(spectrum: _HeightSpectrum, middle: complex, others: list[complex])
 
 
 def _extent(spectrum: _HeightSpectrum, frequency: complex, share: float, bins: float) -> tuple[float, float]:
-    """A share of |f|, but no less than some bins, along (x, y), 1/um."""
+    """Computes a share of |f|, but at least `bins` bins, along (x, y), 1/um."""
     bin_x, bin_y = spectrum.bin_per_um
     return max(share * abs(frequency), bins * bin_x), max(share * abs(frequency), bins * bin_y)
 
 
 def _period(frequency: complex, share: float) -> Period:
-    """A lobe at +-`frequency` as a period."""
+    """Converts the frequency of a lobe, fx + i fy in 1/um, to a period."""
     direction = degrees(atan2(frequency.imag, frequency.real))
     if not -90 < direction <= 90:
         direction += 180 if direction <= -90 else -180
@@ -103,20 +111,20 @@ def _period(frequency: complex, share: float) -> Period:
 
 
 def _spectrum(field: HeightField, highest_per_um: float) -> _HeightSpectrum:
-    """Power spectrum under a Gaussian window (sigma an eighth of the patch), cut at |fx|, |fy| <= highest.
+    """Computes the power spectrum of a field for |fx|, |fy| <= `highest_per_um`, under a Gaussian window.
 
-    Under a Gaussian a line stays a Gaussian, without side lobes that could pass for lines.
+    The window's sigma is an eighth of the patch. It has no side lobes that could be mistaken for lines.
     """
     ny, nx = field.shape
     window = _window(ny)[:, None] * _window(nx)
     seen = (field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))) * window
     weight = float(np.sum(window**2))
-    # Parseval's sum over all frequencies; rounding of a flat field is no structure
+    # by Parseval's theorem, the sum over all frequencies; the rounding errors of a flat field count as 0
     peak, variance = float(np.max(np.abs(field.heights_um))), float(np.vdot(seen, seen)) / weight
     variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
     x, fx = _ascending(nx, field.pitch_um[0], highest_per_um)
     y, fy = _ascending(ny, field.pitch_um[1], highest_per_um)
-    # the half spectrum of real samples holds the rest at the opposite frequency
+    # rfft2 returns half of the spectrum; the other half equals it at opposite frequencies
     opposite = x > nx // 2
     rows, columns = np.where(opposite, -y[:, None], y[:, None]) % ny, np.where(opposite, nx - x, x)
     power = np.abs(fourier.rfft2(seen)[rows, columns]) ** 2 / (seen.size * weight)
@@ -125,22 +133,22 @@ def _spectrum(field: HeightField, highest_per_um: float) -> _HeightSpectrum:
 
 
 def _ascending(samples: int, pitch_um: float, highest_per_um: float) -> tuple[np.ndarray, Array]:
-    """Places in a transform, and their frequencies, up to the highest on either side of 0."""
+    """Returns the indices of a transform and their frequencies, 1/um, ascending from -highest to highest."""
     place, frequency = fft.fftshift(np.arange(samples)), fft.fftshift(fft.fftfreq(samples, pitch_um))
     kept = np.abs(frequency) <= highest_per_um
     return place[kept], frequency[kept]
 
 
 def _window(samples: int) -> Array:
-    """Gaussian over the samples, standard deviation an eighth of them, centred."""
+    """Returns a centred Gaussian window (samples,) whose standard deviation is an eighth of its length."""
     window: Array = np.exp(-0.5 * ((np.arange(samples) - 0.5 * (samples - 1)) / (samples / 8)) ** 2)
     return window
 
 
 def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[complex]:
-    """Frequencies fx + i fy of local maxima in one half plane, by falling power of their lobes.
+    """Finds local maxima of the smoothed spectrum in one half plane, as fx + i fy, by falling power of their lobes.
 
-    Octave by octave, each with a kernel of its own size; octaves overlap, so none falls between two.
+    Each octave of |f| is smoothed by a kernel of its own width. Octaves overlap, so that no maximum lies between two.
     """
     fx, fy = spectrum.fx, spectrum.fy[:, None]
     radius = np.hypot(fx, fy)
@@ -149,7 +157,7 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
     bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
     lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
     candidates: list[tuple[float, complex]] = []
-    # padded with zeros to sizes that transform fast
+    # padded with zeros to sizes with fast transforms
     my, mx = (fft.next_fast_len(n, real=True) for n in spectrum.power.shape)
     transform = fourier.rfft2(spectrum.power, (my, mx))
     while lowest < float(radius.max()):
@@ -157,7 +165,7 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
         density = _smooth(spectrum, transform, (my, mx), width_x, width_y)
         peaks = allowed & (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
         peaks &= density == ndimage.maximum_filter(density, 3)
-        # of a lobe narrower than the kernel this is all, of a wider one a part: let no weak one pass by
+        # all power of a lobe narrower than the kernel, and a part of a wider one's: hence the lower threshold
         power = density * (2 * 2 * pi * width_x * width_y / bin_area)
         peaks &= power > 0.25 * _LEAST_SHARE * spectrum.variance
         candidates += [(float(power[j, i]), complex(fx[i], fy[j, 0])) for j, i in np.argwhere(peaks)]
@@ -173,9 +181,9 @@ def _smooth(
     width_x: float,
     width_y: float,
 ) -> Array:
-    """The power convolved with a Gaussian of widths `width_x`, `width_y`, 1/um.
+    """Convolves the power with a Gaussian of standard deviations `width_x`, `width_y`, 1/um.
 
-    transform: half spectrum of the power, `padded` with zeros to that shape (my, mx).
+    transform: rfft2 of the power, padded with zeros to the shape `padded` (my, mx).
     """
     my, mx = padded
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
@@ -187,7 +195,10 @@ def _smooth(
 def _near(
     spectrum: _HeightSpectrum, middle: complex, reach_x: float, reach_y: float
 ) -> tuple[NDArray[np.complex128], Array]:
-    """Frequencies fx + i fy within a rectangle about `middle` (half sides, 1/um), and their power; flat."""
+    """Returns the frequencies fx + i fy within a rectangle about `middle`, and their power, both (n,).
+
+    reach_x, reach_y: half sides of the rectangle, 1/um.
+    """
     in_x = np.abs(spectrum.fx - middle.real) <= reach_x
     in_y = np.abs(spectrum.fy - middle.imag) <= reach_y
     frequencies = spectrum.fx[in_x] + 1j * spectrum.fy[in_y][:, None]
@@ -195,9 +206,9 @@ def _near(
 
 
 def _middle(spectrum: _HeightSpectrum, start: complex) -> complex:
-    """The middle of the lobe near `start`.
+    """Locates the centre of the lobe near `start`.
 
-    If half the lobe's power is one line, the line's place, which neighbours then cannot pull away.
+    Where a single line holds half of the lobe's power, this is the line's frequency: neighbours then do not shift it.
     """
     middle = _mean_shift(spectrum, start, _extent(spectrum, start, _KERNEL, _KERNEL_BINS), reach=2.5)
     line_width = _extent(spectrum, start, 0.0, _KERNEL_BINS)
@@ -209,10 +220,10 @@ def _middle(spectrum: _HeightSpectrum, start: complex) -> complex:
 
 
 def _mean_shift(spectrum: _HeightSpectrum, start: complex, width: tuple[float, float], reach: float) -> complex:
-    """The mode near `start` of the spectrum smoothed by a Gaussian of these standard deviations, 1/um.
+    """Locates the mode near `start` of the spectrum smoothed by a Gaussian of standard deviations `width`, 1/um.
 
-    It is the kernel-weighted mean of frequencies that reproduces itself, among those within `reach` widths
-    of `start`: a stronger neighbour, such as a harmonic, must not draw it away.
+    The mode is the fixed point of the kernel-weighted mean of frequencies. Only frequencies within `reach` widths of
+    `start` count, because a stronger neighbour, such as a harmonic, would attract the mean.
     """
     frequencies, power = _near(spectrum, start, reach * width[0], reach * width[1])
     middle = start
@@ -227,7 +238,7 @@ def _mean_shift(spectrum: _HeightSpectrum, start: complex, width: tuple[float, f
 
 
 def _share(spectrum: _HeightSpectrum, middle: complex) -> float:
-    """Share of the variance in the lobes at +-f; 0 for a lobe that does not stand out of its ring."""
+    """Computes the share of the variance in the lobes at +-f; 0 for a lobe without contrast to other azimuths."""
     rx, ry = _extent(spectrum, middle, _RADIUS, _RADIUS_BINS)
     frequencies, power = _near(spectrum, middle, rx, ry)
     gap = frequencies - middle
@@ -235,7 +246,7 @@ def _share(spectrum: _HeightSpectrum, middle: complex) -> float:
     lobe = float(np.sum(power[inside]))
     distance = np.hypot(spectrum.fx, spectrum.fy[:, None])
     ring = spectrum.power[np.abs(distance - abs(middle)) <= min(rx, ry)]
-    # the median knows the ring's noise without its lobes; of speckle, exponential, it is log 2 of the mean
-    usual = float(np.median(ring)) / log(2)
-    stands_out = lobe > _LEAST_CONTRAST * usual * np.count_nonzero(inside)
-    return 2 * lobe / spectrum.variance if stands_out else 0.0
+    # lobes hardly change the median of the ring; that of speckle, whose power is exponential, is log 2 of the mean
+    noise = float(np.median(ring)) / log(2)
+    is_lobe = lobe > _LEAST_CONTRAST * noise * np.count_nonzero(inside)
+    return 2 * lobe / spectrum.variance if is_lobe else 0.0

@@ -1,4 +1,4 @@
-"""What a height field is like, in numbers a person can check before baking it."""
+"""Statistics of a height field, to check before a bake."""
 
 from dataclasses import dataclass
 from math import asin, pi, sqrt
@@ -10,24 +10,24 @@ from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.periods import Period, dominant_periods
 
-# [D14] 6.3 takes 500 nm for all visible light
+# [D14] sec. 6.3 takes 500 nm for all visible light
 _REPRESENTATIVE_WAVELENGTH_UM = 0.5
 
 
 @dataclass(frozen=True)
 class SurfaceStatistics:
-    """Every value is JSON-able; pairs are (x, y).
+    """Statistics of one height field; every value can be written as JSON, and pairs are (x, y).
 
     size_um, shape (ny, nx), pitch_um: of the patch.
-    sigma_h_um: standard deviation of the height; range_um: peak to valley.
-    g: (2 pi sigma_h / 0.5 um)^2, [D14] 6.3: below 1 Born's approximation would do, above 1 ray optics.
-    band_limit_per_um: highest frequency the samples carry; reach_per_um: highest that light can ask for,
-    2 / lambda_min; reach_covered: share of the disc of radius reach_per_um inside the band.
-    periods: the strongest periods, by share.
-    seam_step_um: rms height step across the seam from the last column (row) to the first;
-    inner_step_um: rms step between neighbouring columns (rows) inside.
-    seam_energy: share of the heights' variance that only closes the patch's edges upon each other;
-    windows: patch size over the coherence window's sigma.
+    sigma_h_um: standard deviation of the heights. range_um: peak to valley.
+    g: (2 pi sigma_h / 0.5 um)^2, [D14] sec. 6.3: well below 1 Born's approximation holds, well above 1 ray optics.
+    band_limit_per_um: Nyquist limits. reach_per_um: the highest frequency that light can reach, 2 / lambda_min.
+    reach_covered: share of the disc of radius reach_per_um within the Nyquist limits.
+    periods: the strongest periods, by falling share.
+    seam_step_um: rms height step across the seam, from the last column (row) to the first.
+    inner_step_um: rms height step between neighbouring columns (rows) inside the patch.
+    seam_energy: share of the heights' variance in the smooth component that joins opposite edges (Moisan 2011).
+    windows: size of the patch over sigma of the coherence window.
     """
 
     size_um: tuple[float, float]
@@ -47,9 +47,9 @@ class SurfaceStatistics:
 
 
 def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> SurfaceStatistics:
-    """The statistics of a field without holes.
+    """Measures the statistics of a field without holes.
 
-    sigma_um: the coherence window's; lambda_min_nm: the shortest wavelength that will be asked for.
+    sigma_um: standard deviation of the coherence window, um. lambda_min_nm: the shortest wavelength, nm.
     """
     heights = field.heights_um
     sigma_h = float(np.std(heights))
@@ -74,36 +74,37 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
 
 
 def _seam_energy(heights: Array) -> float:
-    """Share of the variance in the smooth part of Moisan's decomposition (2011): a periodic surface has none.
+    """Computes the share of the variance in the smooth component of Moisan's decomposition (2011).
 
-    The part solves a Poisson equation whose sources are the steps across the patch's edges.
+    The component solves a Poisson equation whose sources are the steps across the seams; it is 0 for a periodic
+    surface.
     """
     ny, nx = heights.shape
     turn_x, turn_y = (2.0 * np.pi * np.arange(n) / n for n in (nx, ny))
-    # sources are two rows and two columns, whose transforms are those of lines
+    # the sources lie in two rows and two columns, so that one-dimensional transforms suffice
     rows = fourier.fft(heights[-1] - heights[0]) * (1.0 - np.exp(1j * turn_y))[:, None]
     columns = fourier.fft(heights[:, -1] - heights[:, 0])[:, None] * (1.0 - np.exp(1j * turn_x))
     waves = 2.0 * np.cos(turn_y)[:, None] + 2.0 * np.cos(turn_x)
-    waves[0, 0] = np.inf  # the mean, relative to 4
+    waves[0, 0] = np.inf  # removes the mean, for which waves - 4 would be 0
     smooth = float(np.sum(np.abs((rows + columns) / (waves - 4.0)) ** 2)) / heights.size**2
     variance = float(np.var(heights))
     return smooth / variance if variance > 0.0 else 0.0
 
 
 def _rms(values: Array) -> float:
-    """Root mean square; 0 of nothing."""
+    """Computes the root mean square; 0 for an empty array."""
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
 def covered_share(half_width: float, half_height: float, radius: float) -> float:
-    """Share of the disc of `radius` inside the centred box |fx| <= half_width, |fy| <= half_height; exact."""
+    """Computes the share of the disc of `radius` within the box |fx| <= half_width, |fy| <= half_height, exactly."""
     a, b = min(half_width, radius), min(half_height, radius)
-    # where the disc's rim leaves the box's upper side
+    # x at which the circle meets the upper side of the box
     corner = min(a, sqrt(radius**2 - b**2))
     quarter = b * corner + _under_arc(a, radius) - _under_arc(corner, radius)
     return 4 * quarter / (pi * radius**2)
 
 
 def _under_arc(x: float, radius: float) -> float:
-    """Integral of sqrt(radius^2 - x^2) from 0 to x."""
+    """Integrates sqrt(radius^2 - x^2) from 0 to x."""
     return 0.5 * (x * sqrt(radius**2 - x**2) + radius**2 * asin(x / radius))
