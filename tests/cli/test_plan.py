@@ -15,7 +15,7 @@ def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> No
     assert lines[1].split() == ["stage", "state", "cost"]
     assert [line.split()[:3] for line in lines[2:8]] == [[stage, "to", "do"] for stage in ALL]
     assert lines[8:13] == [f"{stage}: not made before" for stage in STAGES]
-    assert lines[13].startswith("bundle: none of this content stands in out/small")
+    assert lines[13].startswith("bundle: out/small has none of this content")
     assert sorted(path.name for path in tool.folder.iterdir()) == ["small.toml"]
 
 
