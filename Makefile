@@ -1,5 +1,5 @@
-# `make` prints the targets. Everything needed is set up on the way: a virtual environment with pinned versions,
-# and Debian's OpenCL driver for processors where no working device is found.
+# `make` prints the targets. They set up what they need: a virtual environment with pinned versions, and Debian's
+# OpenCL driver for processors where no working device is found.
 
 PYTHON ?= python3
 VENV := .venv
@@ -12,14 +12,14 @@ OUT ?= out
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
 	@echo "make pipeline CONFIG=...     set up, then bake any config (several: CONFIG=\"a.toml b.toml\")"
-	@echo "make bench                   run time against error of every way to a table: table, plots, verdicts"
-	@echo "make validation              every method beside the literature's figures and theory: a page each, verdicts"
+	@echo "make bench                   measure run time against error of every algorithm: table, plots, verdicts"
+	@echo "make validation              compare every method with the literature's figures and theory: pages, verdicts"
 	@echo "make test                    set up, then run linters and every test"
 	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
-	@echo "make test-avx2               the kernels' tests and two bakes, built for a processor without AVX-512"
-	@echo "make lint                    ruff and mypy alone"
-	@echo "make format                  ruff mends and formats the code"
-	@echo "make setup                   only the set-up"
+	@echo "make test-avx2               run the kernels' tests and two bakes as on a processor without AVX-512"
+	@echo "make lint                    run ruff and mypy"
+	@echo "make format                  fix and format the code with ruff"
+	@echo "make setup                   set up, and do nothing else"
 	@echo "make clean                   remove the environment and $(OUT)"
 
 setup: $(VENV)/ready $(VENV)/opencl
@@ -32,8 +32,8 @@ $(VENV)/ready: pyproject.toml requirements.lock
 		--constraint requirements.lock --editable '.[readers,bench,dev]'
 	touch $@
 
-# A device counts when a kernel was built and run on it; `doctor` exits with 5 where none does. A device that
-# DIFFRACT_BAKE_DEVICE asks for in vain is the variable's fault, and doctor says so.
+# A device works when a kernel compiles and runs on it; `doctor` exits with 5 where none does. No driver is installed
+# where DIFFRACT_BAKE_DEVICE is set, because the fault may be its value, which doctor reports.
 $(VENV)/opencl: $(VENV)/ready
 	@$(BAKE) doctor >/dev/null 2>&1 || test -n "$$DIFFRACT_BAKE_DEVICE" || \
 		$(MAKE) --no-print-directory install-opencl
@@ -70,7 +70,7 @@ pipeline: has-config setup
 has-config:
 	@test -n "$(CONFIG)" || { echo "error: name a config: make pipeline CONFIG=configs/blazed.toml" >&2; exit 2; }
 
-# the real scans where they are beside the checkout; without a config, bench and validation take synthetic surfaces
+# the measured scans, where they lie next to the checkout; otherwise bench and validation use synthetic surfaces
 SCANS := $(if $(wildcard ../shared/data/snakes),tests/scans/elaphe_scan.toml tests/scans/xenopeltis_scan.toml configs/blazed.toml)
 bench: setup
 	$(BAKE) bench $(SCANS) --out $(OUT)/bench

@@ -1,1 +1,1 @@
-"""The command line: thin click commands, and all text that people read."""
+"""The command line: click commands, and all text that is printed."""

@@ -1,4 +1,4 @@
-"""`run` and `plan`: what a config needs, and doing it."""
+"""`run` and `plan`: bake configs, and list what a bake would compute."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @click.option(
     "--until",
     type=click.Choice(["surface", "table", "render"]),
-    help="Stop after this stage, with nothing laid out [default: all, and the bundle].",
+    help="Stop after this stage, without results in OUT [default: all stages, and the bundle].",
 )
 @console.out_option
 @console.store_option
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 def run_command(
     config_paths: tuple[Path, ...], until: str | None, out: Path, store_root: Path | None, as_json: bool
 ) -> None:
-    """Do all that CONFIGs ask: surface, stack, table, maps, validation, bundle.
+    """Bake CONFIGs: surface, power spectrum, table, maps, validation, bundle.
 
-    Results land in OUT/NAME: BRDF maps (EXR, PNG), report.html and the bundle. Stages whose inputs have not
+    Results are written to OUT/NAME: BRDF maps (EXR, PNG), report.html and the bundle. Stages whose inputs have not
     changed are taken from the store. All configs are checked before the first one is baked.
     """
     if until is not None:
@@ -36,7 +36,10 @@ def run_command(
 
 
 def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, until: str) -> None:
-    """Every stage of CONFIGs, what people look at laid out, and what came of it told."""
+    """Bakes configs up to a stage, writes their results to `out`, and prints the errors and the files.
+
+    Raises AccuracyError where maps miss their error budget; the results are written nevertheless.
+    """
     from pipeline.errors import AccuracyError
     from pipeline.store import scratch
 
@@ -49,15 +52,15 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
         console.print_json(results)
     else:
         for result in results:
-            _tell(result)
-    # everything was baked and written, but a budget that was asked for and not met is a failure
+            _print_result(result)
+    # everything is baked and written, but a missed error budget is a failure
     missed = [line for _, line in baked if line is not None]
     if missed:
         raise AccuracyError("\n".join(missed))
 
 
 def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_json: bool) -> None:
-    """Only the stages up to one: what they are is told, nothing is laid out."""
+    """Runs the stages up to one and prints their summaries or certificates, without results in OUT."""
     from pipeline.stages import run
 
     results: list[dict[str, Any]] = []
@@ -66,7 +69,7 @@ def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_
         console.note(f"{config.name}:")
         with console.showing_progress() as progress:
             steps = run.plan(config, store, until)
-            made = run.execute(config, steps, store, progress, console.teller(config, store))
+            made = run.execute(config, steps, store, progress, console.step_reporter(config, store))
         stages = {name: {"key": a.key, "summary": a.summary} for name, a in made.items()}
         results.append({"name": config.name, "stages": stages})
     if as_json:
@@ -87,7 +90,7 @@ def _certified(certificate: dict[str, Any]) -> str:
 
 
 def load_all(paths: tuple[Path, ...]) -> "list[Config]":
-    """All configs, each of its own name: two of one name would write into one folder. Raises ConfigError."""
+    """Loads configs. Raises ConfigError for faults, and for two configs of one name, which would share a folder."""
     from pipeline.errors import ConfigError
 
     loaded = [sources.load(path) for path in paths]
@@ -100,14 +103,14 @@ def load_all(paths: tuple[Path, ...]) -> "list[Config]":
 
 
 def _bake(config: "Config", out: Path, store_root: Path | None, until: str) -> tuple[dict[str, Any], str | None]:
-    """The results of a config for machines, and a line where it missed its budget."""
+    """Bakes a config; returns its result as JSON, and a message where it missed its error budget."""
     from pipeline.stages import bake
 
     store = console.open_store(store_root)
     console.note(f"{config.name}:")
     bundle = None
     with console.showing_progress() as progress:
-        given = config, store, out / config.name, progress, console.teller(config, store)
+        given = config, store, out / config.name, progress, console.step_reporter(config, store)
         if until == "bundle":
             made, bundle = bake.make(*given)
         else:
@@ -121,7 +124,7 @@ def _bake(config: "Config", out: Path, store_root: Path | None, until: str) -> t
     return result, made.missed_budget
 
 
-def _tell(result: dict[str, Any]) -> None:
+def _print_result(result: dict[str, Any]) -> None:
     from pipeline.stages.validation_report import ERROR_COLUMNS, error_rows
 
     click.echo(f"{result['name']}: CIELAB error of the table against the exact sum")
@@ -136,7 +139,7 @@ def _tell(result: dict[str, Any]) -> None:
 @console.store_option
 @console.json_option
 def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_json: bool) -> None:
-    """Say what `run` would do: every stage cached or to do, why, and its cost. Computes nothing."""
+    """List what `run` would do: each stage, cached or to do, the reason, and its cost. Computes nothing."""
     store = console.open_store(store_root)
     plans = {config.name: _plan(config, store) for config in load_all(config_paths)}
     if as_json:
@@ -151,7 +154,7 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
 
 
 def _plan(config: "Config", store: Any) -> list[dict[str, str]]:
-    """A row a stage."""
+    """Lists every stage."""
     from pipeline.stages import run
 
     steps = run.plan(config, store)
@@ -160,8 +163,8 @@ def _plan(config: "Config", store: Any) -> list[dict[str, str]]:
             "stage": step.stage.name,
             "key": step.key,
             "state": "cached" if step.cached else "to do",
-            "reason": told.reason,
-            "cost": told.cost,
+            "reason": explanation.reason,
+            "cost": explanation.cost,
         }
-        for step, told in zip(steps, run.explain(config, steps, store), strict=True)
+        for step, explanation in zip(steps, run.explain(config, steps, store), strict=True)
     ]

@@ -1,4 +1,4 @@
-"""What commands share: options, progress on stderr, tables on stdout."""
+"""Functions that all commands share: options, progress on stderr, tables on stdout."""
 
 import json
 import math
@@ -14,11 +14,12 @@ import click
 
 from pipeline.progress import Progress
 
-# a step is worth a line when it lasts longer than people wait without wondering
-_WORTH_TELLING_S = 1.0
+# steps that last longer get a line
+_REPORTED_AFTER_S = 1.0
 
 
 def store_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds --store to a command."""
     return click.option(
         "--store",
         "store_root",
@@ -30,28 +31,30 @@ def store_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def json_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds --json to a command."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines.")(command)
 
 
 def out_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds --out to a command."""
     return click.option(
         "--out",
         type=click.Path(path_type=Path, file_okay=False),
         default=Path("out"),
         show_default=True,
-        help="Folder for results, one subfolder a material.",
+        help="Folder for results, with one subfolder per config.",
     )(command)
 
 
 def open_store(root: Path | None) -> Any:
-    """The store at `root`, or the user's own."""
+    """Opens the store at `root`, by default the user's."""
     from pipeline.store.store import Store, users_folder
 
     return Store(root or users_folder())
 
 
 class FiniteNumber(click.ParamType[float]):
-    """A number in a range; NaN and infinity are none."""
+    """An option's type: a finite number from `low` to below `high`."""
 
     name = "number"
 
@@ -70,11 +73,12 @@ class FiniteNumber(click.ParamType[float]):
 
 
 def print_json(value: Any) -> None:
+    """Prints a JSON document to stdout."""
     click.echo(json.dumps(value, indent=1))
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Left-aligned columns."""
+    """Prints left-aligned columns to stdout, with their names as the first row."""
     widths = [max(len(str(cell)) for cell in column) for column in zip(columns, *rows, strict=True)]
     for row in (columns, *rows):
         cells = [str(cell).ljust(width) for cell, width in zip(row, widths, strict=True)]
@@ -82,15 +86,17 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def warn(text: str) -> None:
+    """Prints a warning to stderr."""
     click.echo(f"warning: {text}", err=True)
 
 
 def note(text: str) -> None:
+    """Prints a line of progress to stderr."""
     click.echo(text, err=True)
 
 
-def warner(config: Any, store: Any) -> Callable[[Any, float | None], None]:
-    """Tells what the surface stage warns of, as soon as it stands."""
+def warning_reporter(config: Any, store: Any) -> Callable[[Any, float | None], None]:
+    """Returns a callback for `run.execute` that prints the warnings of the surface stage."""
 
     def on_step(step: Any, seconds: float | None) -> None:  # noqa: ARG001
         if step.stage.name == "surface":
@@ -100,25 +106,25 @@ def warner(config: Any, store: Any) -> Callable[[Any, float | None], None]:
     return on_step
 
 
-def teller(config: Any, store: Any) -> Callable[[Any, float | None], None]:
-    """Tells of every step how long it took, and what the surface stage warns of."""
-    warn_of = warner(config, store)
+def step_reporter(config: Any, store: Any) -> Callable[[Any, float | None], None]:
+    """Returns a callback for `run.execute` that prints each step's run time, and warnings of the surface stage."""
+    report_warnings = warning_reporter(config, store)
 
     def on_step(step: Any, seconds: float | None) -> None:
         note(f"  {step.stage.name:<9} " + ("cached" if seconds is None else f"{seconds:.1f} s"))
-        warn_of(step, seconds)
+        report_warnings(step, seconds)
 
     return on_step
 
 
 @contextmanager
 def showing_progress() -> Iterator[Progress]:
-    """A live bar on a terminal; elsewhere a line when a step that lasts begins to. Compiling kernels gets a line."""
+    """Yields a progress callback: a bar on a terminal, else a line per long step. It reports compilation, too."""
     from kernels.device import announcing_compilation
 
-    # functools' cache: one line, however many kernels are compiled
+    # functools' cache prints the line once, even if many kernels are compiled
     with announcing_compilation(cache(lambda: note("  compiling kernels for this processor, once ..."))):
-        # without any stderr (2>&-) Python has none either
+        # stderr is None where the process has none (2>&-)
         if sys.stderr is not None and sys.stderr.isatty():
             with _bar() as progress:
                 yield progress
@@ -127,7 +133,7 @@ def showing_progress() -> Iterator[Progress]:
 
 
 class _Lines:
-    """Tells once of each step that takes longer than a second, in plain lines."""
+    """A progress callback that prints one line for each step that takes longer than a second."""
 
     def __init__(self) -> None:
         self._started: dict[str, float] = {}
@@ -137,8 +143,8 @@ class _Lines:
         started = self._started.setdefault(step, now)
         if done >= 1.0:
             del self._started[step]
-        elif now - started > _WORTH_TELLING_S:
-            # told once: a step that begins again is told again
+        elif now - started > _REPORTED_AFTER_S:
+            # once per step; a step that begins again is reported again
             self._started[step] = math.inf
             note(f"  {step}: {100 * done:.0f} % after {now - started:.0f} s ...")
 
@@ -156,7 +162,7 @@ def _bar() -> Iterator[Progress]:
         def progress(step: str, done: float) -> None:
             if step not in tasks:
                 tasks[step] = bars.add_task(step, total=1.0)
-            # what is done leaves at once, before the next line is written below it
+            # a completed bar disappears at once, before the next line of text
             bars.update(tasks[step], completed=done, visible=done < 1.0, refresh=done >= 1.0)
 
         yield progress

@@ -1,4 +1,4 @@
-"""`doctor`: is there a device, which versions, what to do."""
+"""`doctor`: devices, versions, and the remedy where no device works."""
 
 import click
 
@@ -8,9 +8,9 @@ from cli import console
 @click.command("doctor")
 @console.json_option
 def doctor_command(as_json: bool) -> None:
-    """Build and run a kernel on every OpenCL device; say what works, and how to mend what does not.
+    """Compile and run a kernel on every OpenCL device; report which ones work, and the remedy where none does.
 
-    Exit code 5 where no device works. DIFFRACT_BAKE_DEVICE picks a device by a part of its name.
+    Exit code 5 where no device works. DIFFRACT_BAKE_DEVICE chooses a device by a part of its name.
     """
     from kernels import device
     from pipeline.diffraction.device import require_device

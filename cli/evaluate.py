@@ -8,9 +8,6 @@ import click
 
 from cli import console, sources
 
-# as configs have them
-_SHORTEST_NM, _LONGEST_NM = 360.0, 830.0
-
 
 @click.command("eval")
 @click.argument("source", type=click.Path(path_type=Path, exists=True))
@@ -20,17 +17,17 @@ _SHORTEST_NM, _LONGEST_NM = 360.0, 830.0
     required=True,
     help="CSV with rows of theta_i,phi_i,theta_r,phi_r in degrees; '-' reads stdin.",
 )
-@click.option("--exact", is_flag=True, help="By the exact reference instead of the table (configs only).")
+@click.option("--exact", is_flag=True, help="Use the exact reference instead of the table (configs only).")
 @click.option(
     "--wavelengths",
-    help='nm, as 450,550,650: print |P|^2 of each instead of X,Y,Z (configs whose table.form is "spectral").',
+    help='In nm, as 450,550,650: print |P|^2 at each instead of X,Y,Z (configs whose table.form is "spectral").',
 )
 @console.store_option
 @console.json_option
 def eval_command(
     source: Path, directions: Path, exact: bool, wavelengths: str | None, store_root: Path | None, as_json: bool
 ) -> None:
-    """Print X,Y,Z under 1 RU for rows of directions, from SOURCE: a bundle's folder or a config.
+    """Print X,Y,Z at 1 RU for rows of directions, from SOURCE: a bundle's folder or a config.
 
     Directions point away from the surface; theta is measured from its normal, phi from +x.
     """
@@ -55,18 +52,23 @@ def eval_command(
 
 
 def _read_wavelengths(text: str) -> list[float]:
+    from pipeline.optics.light import LONGEST_NM, SHORTEST_NM
+
     try:
         found = [float(cell) for cell in text.split(",")]
     except ValueError:
         found = [0.0]
-    if not all(_SHORTEST_NM <= nm <= _LONGEST_NM for nm in found):
-        limits = f"{_SHORTEST_NM:g}..{_LONGEST_NM:g}"
+    if not all(SHORTEST_NM <= nm <= LONGEST_NM for nm in found):
+        limits = f"{SHORTEST_NM:g}..{LONGEST_NM:g}"
         raise click.UsageError(f"--wavelengths: expected nm within {limits}, as 450,550, got {text!r}")
     return found
 
 
 def _read_directions(path: Path) -> Any:
-    """Rows of four angles in degrees (directions, 4), as a bundle's evaluate.py reads them. Faults name the line."""
+    """Reads rows of four angles in degrees (directions, 4), as a bundle's evaluate.py does; "-" is stdin.
+
+    Raises InputError, which names the offending line.
+    """
     from pipeline.bundle.evaluator import read_directions
     from pipeline.errors import InputError
 

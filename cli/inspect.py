@@ -1,4 +1,4 @@
-"""`inspect`: what a scan, a config or a bundle holds."""
+"""`inspect`: the content of a scan, a config or a bundle."""
 
 import json
 from dataclasses import asdict
@@ -12,18 +12,18 @@ from cli import console
 
 @click.command("inspect")
 @click.argument("source", type=click.Path(path_type=Path, exists=True), required=False)
-@click.option("--channel", help="The channel of a scan file that holds several.")
+@click.option("--channel", help="Channel of a scan file [default: the height channel].")
 @click.option(
     "--schema",
     type=click.Choice(["config", "manifest"]),
-    help="The JSON Schema of every config, or of every bundle's manifest.json, instead of a SOURCE.",
+    help="Print the JSON Schema of configs, or of a bundle's manifest.json, instead of a SOURCE.",
 )
 @console.json_option
 def inspect_command(source: Path | None, channel: str | None, schema: str | None, as_json: bool) -> None:
-    """Say what SOURCE holds: a scan file, a config or a bundle's folder. Bakes nothing.
+    """Print the content of SOURCE: a scan file, a config or a bundle's folder. Bakes nothing.
 
-    With --schema and no SOURCE: which keys a config or a manifest.json may hold, as a JSON Schema, for editors that
-    complete and check, and for programs.
+    With --schema and no SOURCE: print the JSON Schema of a config or of manifest.json, for programs, and for editors
+    that complete and check documents.
     """
     if schema is not None:
         if source is not None or channel is not None:
@@ -31,7 +31,7 @@ def inspect_command(source: Path | None, channel: str | None, schema: str | None
         console.print_json(_schema(schema))
         return
     if source is None:
-        raise click.UsageError("Missing argument 'SOURCE'; or --schema for what may be in one")
+        raise click.UsageError("Missing argument 'SOURCE'; or --schema for the keys of a document")
     if source.is_dir():
         found = _bundle(source)
     elif source.suffix == ".toml":
@@ -65,7 +65,7 @@ def _bundle(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise DamagedError(f"{folder}: not a bundle: manifest.json cannot be read ({error})") from None
     if not isinstance(manifest, dict):
-        raise DamagedError(f"{folder}: not a bundle: manifest.json holds no table of keys")
+        raise DamagedError(f"{folder}: not a bundle: manifest.json is not a JSON object")
     return manifest
 
 

@@ -1,4 +1,4 @@
-"""The `diffract-bake` command: its groups, and faults told in one line with their exit code."""
+"""The `diffract-bake` command: finds subcommands, and turns errors into one line and an exit code."""
 
 import contextlib
 import errno
@@ -8,7 +8,7 @@ import sys
 
 import click
 
-# command -> module: a module is imported when its command is asked for, so that --help stays instant
+# command -> module: modules are imported when their command is used, because --help must start fast
 _COMMANDS = {
     "run": "cli.bake",
     "plan": "cli.bake",
@@ -26,7 +26,7 @@ _COMMANDS = {
 
 
 class LazyGroup(click.Group):
-    """Finds commands in their modules on demand."""
+    """A group whose commands are imported on demand."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(_COMMANDS)
@@ -41,28 +41,29 @@ class LazyGroup(click.Group):
 @click.command(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="diffract-bake")
 def cli() -> None:
-    """Bake a measured nanostructure into light.
+    """Bake a measured nanostructure into tables of its diffraction.
 
-    A TOML config names an AFM scan (or a synthetic recipe); from it come diffraction tables, BRDF maps with
-    measured errors, and a bundle that any shader can use. Everything is cached: a second run does only what changed.
+    A TOML config names an AFM scan (or a synthetic recipe). Baking it makes diffraction tables, BRDF maps with
+    measured errors, and a bundle that any shader can use. All stages are cached: a second run computes only what
+    has changed.
 
     \b
     Start here:
       diffract-bake doctor                    is there a device to compute on?
       diffract-bake inspect SCAN              what is in a scan file?
       diffract-bake run configs/scan.toml     bake your own scan
-      diffract-bake run configs/elaphe.toml   or a synthetic snake
+      diffract-bake run configs/elaphe.toml   or a synthetic snake skin
 
-    Results go to stdout, progress to stderr. Exit codes: 0 done, 1 internal fault, 2 usage or config, 3 scan,
+    Results go to stdout, progress to stderr. Exit codes: 0 done, 1 internal fault, 2 usage or config, 3 input file,
     4 accuracy out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted.
     """
 
 
 def process() -> None:
-    """Entry point of the process: `main`, and the end at once.
+    """Runs `main` and ends the process without the interpreter's cleanup: the entry point.
 
-    Taking the interpreter and hundreds of MB apart takes a fifth of a second, and nothing is left to do: files are
-    closed and locks released where they were taken.
+    The cleanup of hundreds of MB takes a fifth of a second, and nothing depends on it: files are closed and locks
+    released where they are used.
     """
     code: str | int | None = 0
     try:
@@ -72,15 +73,15 @@ def process() -> None:
     with contextlib.suppress(OSError):
         sys.stdout.flush()
         sys.stderr.flush()
-    # as the interpreter ends: nothing is 0, and words are a failure
+    # as sys.exit does: None is 0, and a text is a failure
     os._exit(code if isinstance(code, int) else int(code is not None))
 
 
 def main() -> None:
-    """Runs the command and turns faults into exit codes."""
+    """Runs the command and turns errors into exit codes."""
     from pipeline.errors import BakeError
 
-    # 2^4 cycles until waiting BLAS threads sleep: by default they spin for 2^26, on the kernels' cores
+    # waiting BLAS threads sleep after 2^4 cycles: by default they spin for 2^26, on the cores of the kernels
     os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
     try:
         with cli.make_context("diffract-bake", sys.argv[1:]) as context:
@@ -105,13 +106,13 @@ def main() -> None:
 
 
 def _output_refused(error: OSError) -> int:
-    """Exit code where stdout takes no more: its reader went away (as `| head` does), or its disk is full."""
+    """Returns the exit code where stdout refuses output: the reader ended (as in `| head`), or the disk is full."""
     from pipeline.errors import StorageError
     from pipeline.store.store import FULL
 
     if error.errno not in (errno.EPIPE, *FULL):
         return _internal_fault(error)
-    # what is still buffered would fail again at exit
+    # otherwise the buffered rest would fail again at exit
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno == errno.EPIPE:
         return 0

@@ -1,4 +1,4 @@
-"""`publish` and `verify`: bundles for renderers, and their check."""
+"""`publish` and `verify`: write bundles for renderers, and check them."""
 
 from pathlib import Path
 
@@ -13,16 +13,18 @@ from cli import console, sources
 @console.store_option
 @console.json_option
 def publish_command(config_path: Path, out: Path, store_root: Path | None, as_json: bool) -> None:
-    """Write CONFIG's bundle to OUT/NAME/NAME-VERSION+DIGEST, baking what is missing.
+    """Write the bundle of CONFIG to OUT/NAME/NAME-VERSION+DIGEST, and bake what is missing.
 
-    The bundle holds the tables as EXR, a manifest, a one-page numpy evaluator, maps, report and SHA256SUMS. The same
-    content gives the same digest; a standing bundle is never overwritten.
+    The bundle holds the tables as EXR, a manifest, a one-page numpy evaluator, maps, report and SHA256SUMS. Equal
+    content has the same digest; an existing bundle is never overwritten.
     """
     from pipeline.stages import bundle, run
 
     config, store = sources.load(config_path), console.open_store(store_root)
     with console.showing_progress() as progress:
-        artifacts = run.execute(config, run.plan(config, store), store, progress, console.teller(config, store))
+        artifacts = run.execute(
+            config, run.plan(config, store), store, progress, console.step_reporter(config, store)
+        )
         placed = bundle.place(store.open("bundle", artifacts["bundle"].key), out / config.name)
     if as_json:
         console.print_json({"bundle": str(placed)})
@@ -34,7 +36,7 @@ def publish_command(config_path: Path, out: Path, store_root: Path | None, as_js
 @click.argument("bundle", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @console.json_option
 def verify_command(bundle: Path, as_json: bool) -> None:
-    """Check that BUNDLE is what was published: every file, the manifest, the tables' sizes."""
+    """Check that BUNDLE has not changed since its publication: every file, the manifest, the sizes of the tables."""
     from pipeline.bundle.verify import verify
     from pipeline.errors import DamagedError
 
@@ -44,4 +46,4 @@ def verify_command(bundle: Path, as_json: bool) -> None:
     if faults:
         raise DamagedError("\n".join(f"{bundle}: {fault}" for fault in faults))
     if not as_json:
-        click.echo(f"{bundle}: unharmed")
+        click.echo(f"{bundle}: unchanged")

@@ -1,4 +1,4 @@
-"""`render`: BRDF maps to look at."""
+"""`render`: BRDF maps of any light."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ from cli import console, sources
 
 @click.command("render")
 @click.argument("config_path", metavar="CONFIG", type=click.Path(path_type=Path))
-@click.option("--theta", type=console.FiniteNumber(0, 90), help="Light's angle from the normal, degrees.")
-@click.option("--phi", type=console.FiniteNumber(-360, 361), help="Light's azimuth from +x, degrees [default: 0].")
-@click.option("--size", type=click.IntRange(16, 4096), help="Pixels along one side.")
+@click.option("--theta", type=console.FiniteNumber(0, 90), help="Angle of the light to the normal, deg.")
+@click.option("--phi", type=console.FiniteNumber(-360, 361), help="Azimuth of the light from +x, deg [default: 0].")
+@click.option("--size", type=click.IntRange(16, 4096), help="Pixels per side.")
 @click.option("--exposure", type=console.FiniteNumber(1e-9), help="Exposure of the PNG, RU.")
-@click.option("--exact", is_flag=True, help="By the exact reference instead of the table.")
+@click.option("--exact", is_flag=True, help="Use the exact reference instead of the table.")
 @console.out_option
 @console.store_option
 @console.json_option
@@ -28,12 +28,12 @@ def render_command(
     store_root: Path | None,
     as_json: bool,
 ) -> None:
-    """Render BRDF maps of CONFIG: its own lights, or one given by --theta and --phi.
+    """Render BRDF maps of CONFIG for its own lights, or for one given by --theta and --phi.
 
-    A map shows every view of one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files go
-    to OUT/NAME as EXR (linear XYZ, 1 RU) and PNG.
+    A map shows all views under one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files are
+    written to OUT/NAME as EXR (linear XYZ at 1 RU) and PNG.
     """
-    from pipeline.optics.colour_error import pixels
+    from pipeline.optics.colour import pixels
     from pipeline.optics.scene import Direction
     from pipeline.report import images
     from pipeline.stages import render
@@ -42,7 +42,7 @@ def render_command(
     from pipeline.tables.evaluate import Map, render_map
 
     if theta is None and phi is not None:
-        raise click.UsageError("--phi turns a light given by --theta; name both")
+        raise click.UsageError("--phi needs --theta: give both angles of the light")
     config = sources.load(config_path)
     lights = config.render.lights if theta is None else [Direction(theta_deg=theta, phi_deg=phi or 0.0)]
     views = Map(size or config.render.size, render.map_radius(config))
@@ -52,11 +52,11 @@ def render_command(
         shown = [render_map(evaluate, render.light_direction(light), views) for light in lights]
     for light, image in zip(lights, shown, strict=True):
         sources.refuse_unreached(image, f"the light {light.theta_deg:g}°, {light.phi_deg:g}°", str(config_path))
-    with writing(folder), scratch.replacing(folder) as beside:
+    with writing(folder), scratch.replacing(folder) as temporary:
         for light, image in zip(lights, shown, strict=True):
             name = render.map_name(light) + ("_exact" if exact else "")
-            images.write_xyz(beside / f"{name}.exr", image)
-            images.write_png(beside / f"{name}.png", pixels(image / unit, exposure or config.render.exposure_ru))
+            images.write_xyz(temporary / f"{name}.exr", image)
+            images.write_png(temporary / f"{name}.png", pixels(image / unit, exposure or config.render.exposure_ru))
             made += [str(folder / f"{name}.exr"), str(folder / f"{name}.png")]
     if as_json:
         console.print_json({"files": made})

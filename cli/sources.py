@@ -1,4 +1,4 @@
-"""Where commands take radiance from: a config's table, its exact reference, or a bundle."""
+"""Sources of radiance for commands: the table of a config, its exact reference, or a bundle."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from cli import console
 
 
 def load(path: Path) -> Any:
-    """The config in a file, with every fault that can be seen before work starts. Raises ConfigError."""
+    """Loads a config and checks all that can be checked before a bake. Raises ConfigError with all faults."""
     from pipeline.config import read as config_file
     from pipeline.stages import config_check as preflight
 
@@ -19,7 +19,10 @@ def load(path: Path) -> Any:
 
 
 def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
-    """XYZ of pairs of directions from SOURCE, a bundle's folder or a config."""
+    """Returns a function (wi, wr) -> XYZ, (n, 3) each, from SOURCE, a bundle's folder or a config.
+
+    exact: whether the exact reference is used; only a config has one. Raises click.UsageError for a bundle.
+    """
     if source.is_dir():
         if exact:
             raise click.UsageError("--exact needs a config: a bundle holds tables, not the surface")
@@ -30,13 +33,8 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
 
 
 def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
-    """XYZ of pairs of directions from a config, baking what is missing."""
-    from pipeline.stages import run
-
-    store = console.open_store(store_root)
-    until = "surface" if exact else "table"
-    artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
-    artifact = store.open(until, artifacts[until].key)
+    """Returns a function (wi, wr) -> XYZ, (n, 3) each, of a config, and bakes what it needs."""
+    artifact = _artifact(config, "surface" if exact else "table", store_root, progress)
     if exact:
         from pipeline.accuracy.exact import reference_evaluator
         from pipeline.stages import surface
@@ -49,7 +47,10 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
 
 
 def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
-    """|P|^2 of pairs of directions at wavelengths in nm, from a config's power spectrum or its exact reference."""
+    """Returns a function (wi, wr, lambda_nm) -> |P|^2, (n, 3), (n, 3), (L,) -> (n, L), of a config's power spectrum.
+
+    exact: whether the exact reference is used instead. Raises click.UsageError for a bundle, or another table.form.
+    """
     if source.is_dir():
         raise click.UsageError("--wavelengths needs a config: a bundle's tables are integrated over wavelengths")
     config = load(source)
@@ -57,14 +58,11 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
         raise click.UsageError('--wavelengths needs table.form = "spectral" in the config, or --exact')
     from pipeline.accuracy.exact import reference_of
     from pipeline.optics.geometry import uvw
-    from pipeline.stages import run, surface
+    from pipeline.stages import surface
     from pipeline.stages.polar import power_spectrum
     from pipeline.tables.polar import spectral
 
-    store = console.open_store(store_root)
-    until = "surface" if exact else "power_spectrum"
-    artifacts = run.execute(config, run.plan(config, store, until), store, progress, console.warner(config, store))
-    artifact = store.open(until, artifacts[until].key)
+    artifact = _artifact(config, "surface" if exact else "power_spectrum", store_root, progress)
     if exact:
         reference = reference_of(surface.load(artifact), config, progress)
         return lambda wi, wr, lambda_nm: reference.power(uvw(wi, wr), lambda_nm)
@@ -72,8 +70,21 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
     return lambda wi, wr, lambda_nm: spectral.look_up(table, uvw(wi, wr), lambda_nm)
 
 
+def _artifact(config: Any, stage: str, store_root: Path | None, progress: Any) -> Any:
+    """Bakes a config up to a stage and returns that stage's artifact, checked."""
+    from pipeline.stages import run
+
+    store = console.open_store(store_root)
+    steps = run.plan(config, store, stage)
+    artifacts = run.execute(config, steps, store, progress, console.warning_reporter(config, store))
+    return store.open(stage, artifacts[stage].key)
+
+
 def refuse_unreached(xyz: Any, what: str, source: str) -> None:
-    """Tables made for a scene do not know the rest: NaN becomes a message."""
+    """Raises InputError where values are NaN, for directions outside the scene of a table.
+
+    xyz: (..., n). what: name of the directions. source: name of the config or bundle.
+    """
     import numpy as np
 
     from pipeline.errors import InputError
@@ -81,6 +92,6 @@ def refuse_unreached(xyz: Any, what: str, source: str) -> None:
     unreached = int(np.sum(~np.isfinite(xyz).all(axis=-1)))
     if unreached:
         raise InputError(
-            f"{source}: {unreached} of the directions of {what} are outside the [scene] that it was baked for; leave "
-            "[scene] out to bake all directions"
+            f"{source}: {unreached} of the directions of {what} are outside the [scene] for which it was baked; "
+            "leave [scene] out to bake all directions"
         )

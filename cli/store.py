@@ -1,4 +1,4 @@
-"""`store`: list, check and collect cached artifacts."""
+"""`store`: list, check and remove cached artifacts."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ _MIB = 2**20
 
 @click.group("store")
 def store_command() -> None:
-    """List, check and collect the cached artifacts that runs share."""
+    """List, check and remove the cached artifacts that runs share."""
 
 
 @store_command.command("list")
@@ -33,7 +33,7 @@ def list_command(store_root: Path | None, as_json: bool) -> None:
 @console.store_option
 @console.json_option
 def check_command(store_root: Path | None, as_json: bool) -> None:
-    """Compare every file with the digest it was written with; exit code 6 where one differs."""
+    """Compare every file with its recorded digest; exit code 6 where one differs."""
     from pipeline.errors import DamagedError
 
     store = console.open_store(store_root)
@@ -43,15 +43,19 @@ def check_command(store_root: Path | None, as_json: bool) -> None:
     if faults:
         raise DamagedError("\n".join(faults))
     if not as_json:
-        click.echo(f"{len(store.artifacts())} artifacts in {store.root}: unharmed")
+        click.echo(f"{len(store.artifacts())} artifacts in {store.root}: unchanged")
 
 
 @store_command.command("collect")
-@click.option("--unused-days", type=console.FiniteNumber(0), help="Also remove artifacts unused for so many days.")
+@click.option(
+    "--unused-days",
+    type=console.FiniteNumber(0),
+    help="Also remove artifacts unused for this many days.",
+)
 @console.store_option
 @console.json_option
 def collect_command(unused_days: float | None, store_root: Path | None, as_json: bool) -> None:
-    """Remove damaged artifacts, what killed runs left, and, where asked, what was long unused."""
+    """Remove damaged artifacts, temporary folders of killed runs, and optionally artifacts that were long unused."""
     store = console.open_store(store_root)
     removed, freed = store.collect(unused_days)
     if as_json:

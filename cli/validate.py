@@ -125,7 +125,7 @@ def _surface(role: str, config: Any, store: Any) -> Any:
 
     console.note(f"{config.name}:")
     with console.showing_progress() as progress:
-        told = console.teller(config, store)
+        told = console.step_reporter(config, store)
         made = run.execute(config, run.plan(config, store, "surface"), store, progress, told)
     field = surface.load(store.open("surface", made["surface"].key))
     if field.half_range_um == 0.0:

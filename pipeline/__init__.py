@@ -1,9 +1,9 @@
-"""The stages from a measured height field to a table of light, and the physics they share.
+"""The stages from a measured height field to tables of its diffraction, and the physics that they share.
 
     from pipeline import Bundle, bake, load_scan
 
-is the public API (pipeline/api.py). It is loaded when one of its names is asked for, so that importing a single room
-stays cheap.
+is the public API (pipeline/api.py). It is imported when one of its names is first used, because other modules of the
+package must import fast.
 """
 
 from typing import TYPE_CHECKING, Any

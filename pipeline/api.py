@@ -1,4 +1,4 @@
-"""The public API: a scan, a bake, a bundle. `from pipeline import Bundle, bake, load_scan`."""
+"""The public API: load_scan, bake and Bundle, which `from pipeline import ...` gives."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,29 +14,30 @@ from pipeline.errors import AccuracyError, InputError
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
-# of a direction's length: far above float32's rounding, far below what would be seen
+# tolerance of a direction's length: far above the rounding of float32, and too small to be seen
 _UNIT = 1e-4
 
 
 def load_scan(path: str | Path, **keys: Any) -> HeightField:
-    """Reads a scan file and cleans it as a config's [surface] does.
+    """Reads a scan file and conditions it as a config's [surface] does.
 
     path: a file of any format that docs/usage.md lists.
     keys: those of [surface], with its units and defaults: channel, pitch_um (um, one number or (x, y)), height_unit,
         height_range_um (um), override_file_units, level, clip_percentile ((low, high), percent).
 
     Returns the height field: heights_um, float64 (ny, nx), um, x growing with the column and y up with the row;
-    pitch_um, (x, y), um. Holes are filled, the surface is levelled (by a plane unless told otherwise) and centred.
+    pitch_um, (x, y), um. Holes are filled; the surface is levelled, by a plane unless `level` says otherwise, and
+    centred.
 
-    Raises ConfigError for keys that are wrong; InputError where the file cannot be read or trusted, or lacks a unit
-    (it names the key to give).
+    Raises ConfigError for wrong keys; InputError where the file cannot be read or trusted, or lacks a unit (the
+    message names the key to give).
     """
     from pipeline.surface import load
     from pipeline.surface.conditioning import condition
 
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such scan file")
+        raise InputError(f"{path}: no such scan file; check the path")
     section = {"path": str(path), **keys}
     surface = read.parse({"name": "scan", "surface": section}, str(path), Path.cwd()).surface
     field, _ = load.load_scan(surface)
@@ -45,11 +46,12 @@ def load_scan(path: str | Path, **keys: Any) -> HeightField:
 
 @dataclass(frozen=True)
 class Baked:
-    """What a bake wrote, and how far its table is from the exact sum.
+    """The files that a bake wrote, and the errors of its table against the exact sum.
 
-    name: the config's. bundle: the bundle's folder. report: one page with everything. maps: BRDF maps of the
-    config's lights, an EXR (linear XYZ at 1 RU) and a PNG each. measured_error: errors of the table, as in
-    manifest.json. certificate: errors of the table on random directions, likewise.
+    name: the config's. bundle: the bundle's folder. report: an HTML page.
+    maps: for each light, its BRDF map as an EXR (linear XYZ at 1 RU) and as a PNG.
+    measured_error: errors of the table, as in manifest.json.
+    certificate: errors of the table on random directions that its planning did not use, as in manifest.json.
     """
 
     name: str
@@ -67,21 +69,21 @@ def bake(
     store: str | Path | None = None,
     progress: Progress = silent,
 ) -> Baked:
-    """Does all that a config asks, as `diffract-bake run` does: surface, table, maps, validation, bundle.
+    """Runs all stages of a config, as `diffract-bake run` does: surface, table, maps, validation, bundle.
 
     config: path of a TOML file, whose relative file names start from its folder; or a Config
         (pipeline.config.models), whose names start from the working folder.
     out: folder for results, which land in out/NAME.
-    store: folder of cached artifacts; $DIFFRACT_BAKE_STORE or the user's cache folder by default. Stages whose inputs
-        have not changed are taken from there.
-    progress: called with a step's name and the share of it that is done, 0 to 1.
+    store: folder of cached artifacts, by default $DIFFRACT_BAKE_STORE or the user's cache folder. A stage is computed
+        again only where its inputs have changed.
+    progress: called with the name of a step and its completed share, 0 to 1.
 
-    Returns where the results are, and the measured errors.
+    Returns the paths of the results and the measured errors.
 
     Raises a class of pipeline.errors: ConfigError with every fault; InputError for a scan that cannot be trusted;
-    AccuracyError for a budget out of reach, or one that the maps miss (results are written all the same);
-    DeviceError without a working OpenCL device; DamagedError for what is no longer what it was; StorageError where
-    nothing can be written.
+    AccuracyError for an error budget out of reach, or one that the maps miss (the results are written nevertheless);
+    DeviceError without a working OpenCL device; DamagedError for a damaged artifact; StorageError where a file cannot
+    be written.
     """
     from pipeline.stages import bake as baking
     from pipeline.stages import config_check
@@ -89,7 +91,7 @@ def bake(
     from pipeline.store.store import Store, users_folder
 
     if isinstance(config, Config):
-        # what ties sections together, and names of files, are looked at where a document is read
+        # relations between sections, and file names, are checked where a document is parsed
         source = f"config {config.name}"
         config = read.parse(config.model_dump(exclude_unset=True), source, Path.cwd())
     else:
@@ -114,14 +116,14 @@ def bake(
 
 
 class Bundle:
-    """A published bundle, checked and in memory."""
+    """A published bundle, verified and held in memory."""
 
     def __init__(self, path: str | Path) -> None:
-        """Opens a bundle and checks every file of it.
+        """Opens a bundle and verifies every file.
 
         path: the bundle's folder.
 
-        Raises DamagedError where it is not what was published.
+        Raises DamagedError where a file has changed since the publication.
         """
         from pipeline.bundle.verify import open_bundle
 
@@ -130,17 +132,17 @@ class Bundle:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """manifest.json; docs/schemas/manifest.json says what it holds."""
+        """The content of manifest.json, which docs/schemas/manifest.json describes."""
         return self._bundle.manifest
 
     def xyz(self, wi: ArrayLike, wr: ArrayLike) -> NDArray[np.float64]:
-        """Looks up the light that pairs of directions reflect.
+        """Looks up the reflected colour for pairs of directions.
 
-        wi, wr: unit vectors (n, 3) towards the light and the view, away from the surface, z its normal; one of
-            both may be a single direction, (3,), for all of the other.
+        wi, wr: unit vectors (n, 3) towards the light and the view, away from the surface, with z its normal; one of
+            them may be a single direction, (3,).
 
-        Returns linear CIE XYZ (n, 3) under 1 RU, where a perfect mirror in its own reflection has Y = 1; NaN for
-        directions outside the [scene] that the bundle was baked for.
+        Returns linear CIE XYZ (n, 3) at 1 RU, where a perfect mirror seen in its own reflection has Y = 1; NaN for
+        directions outside the [scene] for which the bundle was baked.
 
         Raises ValueError for other shapes, and for vectors that are not of length 1 or not above the horizon.
         """
@@ -148,9 +150,9 @@ class Bundle:
         return self._bundle.xyz(light, view)
 
     def verify(self) -> list[str]:
-        """Checks the folder once more.
+        """Verifies the files of the bundle's folder again.
 
-        Returns one line for every fault; none where it is what was published.
+        Returns one line for each fault; an empty list where nothing has changed since the publication.
         """
         from pipeline.bundle.verify import verify
 

@@ -1,18 +1,21 @@
-"""What can go wrong, told to a person in one line.
+"""The project's exceptions.
 
-Every message says where the fault is, what was expected, what was found and the way out. Each class
-carries the process exit code that docs/usage.md documents.
+Every message fits in one line: it names the file or key, what was expected, what was found and how to proceed. Each
+class carries the exit code that docs/usage.md documents.
 """
 
 
 class BakeError(Exception):
-    """A fault the user can mend; never shown with a traceback."""
+    """Base of faults that the user can correct; the command line shows them without a traceback."""
 
     exit_code = 1
 
 
 class ConfigError(BakeError):
-    """A config file has faults; `faults` lists every one as (key path, message)."""
+    """A config is faulty.
+
+    source: the config's file or name. faults: all of them, as (path of the key, message).
+    """
 
     exit_code = 2
 
@@ -30,24 +33,24 @@ class InputError(BakeError):
 
 
 class AccuracyError(BakeError):
-    """The digits asked for cannot be had by the method chosen."""
+    """The chosen method cannot reach the requested accuracy."""
 
     exit_code = 4
 
 
 class DeviceError(BakeError):
-    """No OpenCL device can build and run a kernel."""
+    """No OpenCL device can compile and run a kernel."""
 
     exit_code = 5
 
 
 class DamagedError(BakeError):
-    """A stored artifact or a bundle is not what it was when it was written."""
+    """A stored artifact or a bundle has changed since it was written."""
 
     exit_code = 6
 
 
 class StorageError(BakeError):
-    """Nothing could be written: disk full, no permission."""
+    """A file could not be written: the disk is full, or permission is missing."""
 
     exit_code = 7

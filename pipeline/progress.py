@@ -1,13 +1,13 @@
-"""How stages tell how far they are, without knowing who listens."""
+"""The progress callback of long computations."""
 
 from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called with a step's name and the share of it that is done, 0 to 1."""
+    """A function that is called with the name of a step and its completed share, 0 to 1."""
 
     def __call__(self, step: str, done: float) -> None: ...
 
 
 def silent(step: str, done: float) -> None:
-    """Nobody listens."""
+    """Ignores progress: the default callback."""

@@ -1,10 +1,10 @@
-"""Values that are checked when they are made: the base class and the types that all descriptions share."""
+"""The base class and the field types of config sections, which are validated when they are made."""
 
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo
 
-# lax only where TOML has no tuple: arrays become tuples, everything else keeps its type
+# not strict, because TOML has arrays and no tuples
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 PositivePair = Annotated[tuple[Positive, Positive], Field(strict=False)]
@@ -12,31 +12,34 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Validated(BaseModel):
-    """Base of described values: unknown keys, wrong types and later changes are errors."""
+    """Base class that rejects unknown keys, wrong types and assignments."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 def as_pair(value: float | tuple[float, float]) -> tuple[float, float]:
-    """One number stands for both axes; two are (x, y)."""
+    """Returns (x, y) of a pair, or of one number that applies to both axes."""
     return value if isinstance(value, tuple) else (value, value)
 
 
 def is_csv(text: str) -> bool:
+    """Whether a value names a CSV file."""
     return text.lower().endswith(".csv")
 
 
 def existing_file(name: str, info: ValidationInfo) -> str:
-    """The absolute name of a file that is there; names are relative to the config's folder.
+    """Resolves a file name against the config's folder; without one, outside `config.read`, the name stays as it is.
 
-    Outside `parse` no folder is known, and a name stays as it is.
+    name: absolute, or relative to the config. info: its context holds the folder.
+    Returns the absolute name.
+    Raises ValueError where no such file exists.
     """
     if info.context is None:
         return name
     try:
         path = (info.context["folder"] / name).resolve()
         found = path.is_file()
-    # a loop of links is a RuntimeError before Python 3.13
+    # before Python 3.13, a loop of symbolic links is a RuntimeError
     except (OSError, RuntimeError) as error:
         raise ValueError(f"cannot be read: {error}") from None
     if not found:

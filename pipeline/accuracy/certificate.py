@@ -21,7 +21,7 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import ColourError
+from pipeline.optics.colour import ColourError
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress, silent

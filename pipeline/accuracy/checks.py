@@ -11,7 +11,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference, Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import ColourError, colour_errors, delta_e
+from pipeline.optics.colour import ColourError, colour_errors, delta_e
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress, silent

@@ -13,7 +13,7 @@ from pipeline.diffraction.polar_grid import TILE, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import STEP_NM, MeanReference
 from pipeline.optics import brdf, geometry
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.optics.light import trapezoid
 from pipeline.tables.evaluate import Evaluator, Map, table_evaluator
 from pipeline.tables.planning import plan

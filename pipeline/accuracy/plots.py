@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.accuracy.checks import MapCheck
 from pipeline.accuracy.convergence import Curve
-from pipeline.optics.colour_error import pixels
+from pipeline.optics.colour import pixels
 from pipeline.surface.heightfield import HeightField
 
 _DPI = 110

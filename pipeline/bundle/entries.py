@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pipeline.accuracy import scalar_domain
 from pipeline.bundle.manifest import Colour, Coverage, Domain, MadeBy, Provenance
 from pipeline.config.models import Config
-from pipeline.optics import validity
 from pipeline.optics.light import LaserLine
 from pipeline.store.digest import of_file
 from pipeline.store.store import Artifact
-from pipeline.surface.statistics import Period
+from pipeline.surface.periods import Period
 from pipeline.tables.taylor import grid
 
 _NOT_RECORDED = "not recorded"
@@ -72,14 +72,14 @@ def domain(config: Config, inputs: Mapping[str, Artifact]) -> Domain:
     lambda_nm = illuminant.lambda_nm if isinstance(illuminant, LaserLine) else _LUMINOUS_NM
     statistics = inputs["surface"].summary["statistics"]
     periods = [Period(**period) for period in statistics["periods"]]
-    finest = validity.finest_period_um(periods)
-    found = validity.place(finest, statistics["sigma_h_um"], lambda_nm) if periods else None
+    finest = scalar_domain.finest_period_um(periods)
+    found = scalar_domain.place(finest, statistics["sigma_h_um"], lambda_nm) if periods else None
     return Domain(
         lambda_nm=lambda_nm,
         period_over_lambda=None if found is None else found.period,
         error_of_smooth=None if found is None else found.smooth,
         error_of_edged=None if found is None else found.edged,
-        tolerated=validity.TOLERATED,
+        tolerated=scalar_domain.TOLERATED,
         within=None if found is None else found.within,
     )
 

@@ -11,7 +11,7 @@ from pydantic import Field
 from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RelativeError
 from pipeline.bundle.material import MaterialEntry
-from pipeline.optics.colour_error import ColourError
+from pipeline.optics.colour import ColourError
 from pipeline.validated import Validated
 
 MANIFEST = "manifest.json"

@@ -15,7 +15,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import ColourError, delta_e
+from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar.compression import Textures, compress, flattened, most_textures, whole

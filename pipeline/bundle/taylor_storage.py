@@ -13,7 +13,7 @@ from pipeline.bundle import half
 from pipeline.bundle.manifest import TaylorLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor.table import TaylorTable

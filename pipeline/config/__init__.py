@@ -1,1 +1,1 @@
-"""The TOML that describes one material: its models, and reading it with all its faults."""
+"""Configs: the TOML document that describes one material, and its reader."""

@@ -1,8 +1,8 @@
-"""The TOML that describes one material: its sections, its defaults and its faults.
+"""The TOML document that describes one material: its sections and their defaults.
 
-Keys and units are those of docs/usage.md; an unknown key is a fault. Each section is a value of the room that reads
-it. `read.load` collects every fault of a file before it raises, each with its key path; faults between sections are
-looked for once each of them is sound.
+docs/usage.md explains keys and units; an unknown key is a fault. Each section is a value of the package that reads
+it. `read.load` reports all faults of a file at once, each with the path of its key. Relations between sections are
+checked where every section is valid.
 """
 
 from typing import Annotated, Literal, Self
@@ -19,33 +19,48 @@ from pipeline.surface.source import SurfaceSource
 from pipeline.tables.polar.layout import PolarLayout
 from pipeline.validated import Positive, Validated
 
-# what a polar table is planned for where no budget is set
+# the mean CIELAB error for which polar tables are planned where the config sets no budget
 DEFAULT_DELTA_E = 0.1
 
 
 class Accuracy(Validated):
-    """The error budget: mean CIELAB error at one exposure. Polar tables are planned for it, and for 0.1 without."""
+    """The error budget: a config's [accuracy].
+
+    delta_e: allowed mean CIELAB error; without it, polar tables are planned for 0.1 and no limit is enforced.
+    exposure_ru: the exposure of that error, RU.
+    """
 
     delta_e: Annotated[float, Field(ge=1e-3, le=100)] | None = None
     exposure_ru: Positive = 7500.0
 
 
 class Render(Validated):
+    """The BRDF maps: a config's [render].
+
+    size: pixels per side. lights: one map each. exposure_ru: exposure of the pictures, RU.
+    """
+
     size: Annotated[int, Field(ge=16, le=4096)] = 512
     lights: Lights = Field(default_factory=lambda: [Direction(theta_deg=0.0)])
     exposure_ru: Positive = 1500.0
 
 
 class Publish(Validated):
+    """The bundle: a config's [publish].
+
+    version: of the content, in its name. precision: of the textures. licence: of the scan, as a text.
+    textures: how many RGBA textures hold a polar table; "auto": all in float, as few as the error budget allows in
+        half; "full": all.
+    """
+
     version: Annotated[str, Field(pattern=r"^\d+\.\d+\.\d+$")] = "1.0.0"
     precision: Literal["float", "half"] = "float"
-    # RGBA textures of a polar table; "auto": all in float, as few as the error budget allows in half
     textures: Literal["auto", "full"] | Annotated[int, Field(ge=1)] = "auto"
     licence: str | None = None
 
 
 class Config(Validated):
-    """One material, whole; the light is the TOML's [spectrum]."""
+    """A whole config: one material. Its field `light` is the section [spectrum] of the TOML."""
 
     model_config = ConfigDict(serialize_by_alias=True)
 
@@ -62,19 +77,19 @@ class Config(Validated):
 
     @property
     def budget_delta_e(self) -> float:
-        """The mean CIELAB error that a polar table is planned for."""
+        """The mean CIELAB error for which a polar table is planned."""
         return DEFAULT_DELTA_E if self.accuracy.delta_e is None else self.accuracy.delta_e
 
     @property
     def radiometry(self) -> Radiometry:
-        """Light, material and window: all that turns |P|^2 into radiance."""
+        """Light, material and width of the coherence window, which turn |P|^2 into radiance."""
         return Radiometry(self.light, self.material, self.coherence.sigma_um, self.table.mean_step_nm)
 
     @model_validator(mode="after")
     def maps_show_the_scene(self) -> Self:
-        """Without lights of their own, maps take the scene's."""
+        """Takes the lights of the scene for maps without lights of their own."""
         if self.scene is None or "lights" in self.render.model_fields_set:
             return self
-        # frozen, but not yet handed out
+        # the model is frozen, but nobody holds it yet
         object.__setattr__(self, "render", self.render.model_copy(update={"lights": self.scene.lights}))
         return self

@@ -1,4 +1,4 @@
-"""Reading a config file: every fault is collected before any is raised, each with its key path."""
+"""Reads config files. All faults of a file are reported at once, each with the path of its key."""
 
 import tomllib
 from pathlib import Path
@@ -15,9 +15,9 @@ _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind i
 
 
 def load(path: Path) -> Config:
-    """The config in a TOML file, with relative file paths resolved against its folder.
+    """Reads a config from a TOML file, and resolves relative file names against its folder.
 
-    Raises ConfigError with every fault found.
+    Raises ConfigError with all faults.
     """
     source = str(path)
     try:
@@ -34,7 +34,11 @@ def load(path: Path) -> Config:
 
 
 def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
-    """The config in a parsed TOML document; `folder` is what relative paths start from."""
+    """Makes a config from a parsed TOML document.
+
+    document: sections by name. source: name of the document, for messages. folder: start of relative file names.
+    Raises ConfigError with all faults.
+    """
     try:
         config = Config.model_validate(document, context={"folder": folder})
     except ValidationError as error:
@@ -46,13 +50,13 @@ def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
 
 
 def _scene_faults(config: Config) -> list[tuple[str, str]]:
-    """Lights to render that the scene leaves out of the table."""
+    """Finds lights of [render] that are not in [scene]: the table does not cover them."""
     if config.scene is None:
         return []
     return [
         (
             f"render.lights.{i}",
-            f"no light of [scene]: theta {light.theta_deg:g}, phi {light.phi_deg:g} degrees; add it there",
+            f"expected a light of [scene], got theta {light.theta_deg:g}, phi {light.phi_deg:g} deg; add it there",
         )
         for i, light in enumerate(config.render.lights)
         if not any(light.same_as(other) for other in config.scene.lights)
@@ -60,7 +64,7 @@ def _scene_faults(config: Config) -> list[tuple[str, str]]:
 
 
 def _repeated_lights(config: Config) -> list[tuple[str, str]]:
-    """Lights whose maps would be one: the same within a millionth of a degree."""
+    """Finds lights of [render] that are equal, within a millionth of a degree, and would write the same map."""
     lights = config.render.lights
     return [
         (f"render.lights.{i}", f"the same light as render.lights.{j}")
@@ -71,16 +75,16 @@ def _repeated_lights(config: Config) -> list[tuple[str, str]]:
 
 
 def _texture_faults(config: Config) -> list[tuple[str, str]]:
-    """The paper's table is an image for every power of w; only a polar one is stored at a chosen rank."""
+    """Finds a number of textures for the paper's table, which always has one image per power of w."""
     if not config.table.compresses and config.publish.textures not in ("auto", "full"):
         return [
-            ("publish.textures", f"{config.publish.textures} textures hold a polar table only; leave it out here")
+            ("publish.textures", f"{config.publish.textures} applies to polar tables only; leave it out for others")
         ]
     return []
 
 
 def _merged(faults: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """One fault a key: a value that fits no form of a union is told once, with what each form expects."""
+    """Joins the faults of each key: for a value that fits no member of a union, pydantic reports one per member."""
     by_key: dict[str, list[str]] = {}
     for key, text in faults:
         by_key.setdefault(key, []).append(text)
@@ -88,8 +92,8 @@ def _merged(faults: list[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _fault(error: Any) -> tuple[str, str]:
-    """A pydantic error as (key path, one sentence)."""
-    # tags of unions ("blazed", "float") are pydantic's, not the user's keys; an unknown key is always theirs
+    """Converts a pydantic error to (path of the key, message)."""
+    # pydantic inserts tags of unions ("blazed", "float") into the path; an unknown key is always the user's
     unknown = error["type"] == "extra_forbidden"
     path, last = (error["loc"][:-1], error["loc"][-1:]) if unknown else (error["loc"], ())
     parts = [p for p in path if not (isinstance(p, str) and _is_union_tag(p, path))]

@@ -1,8 +1,9 @@
-"""Transforms of `scipy.fft` with FFTW behind them.
+"""Transforms of `scipy.fft` with FFTW as its backend.
 
-Plans are FFTW_ESTIMATE's, on one thread and without wisdom. A surface asks for each transform once or a few times,
-and FFTW_MEASURE takes longer to plan one than that (0.6 s for 1332 x 1332 samples, 1.5 s for 722 x 722, against 5 and
-11 ms); and a plan that depends on nothing but the size gives a recipe's heights to the last bit on every run.
+Plans are made by FFTW_ESTIMATE, for one thread and without wisdom. A surface needs each transform once or a few
+times, and planning by FFTW_MEASURE would take longer (0.6 s for 1332 x 1332 samples and 1.5 s for 722 x 722, against
+5 and 11 ms). A plan that depends only on the size also reproduces the heights of a recipe to the last bit in every
+run.
 """
 
 from collections.abc import Iterator
@@ -18,24 +19,24 @@ from scipy import fft as scipy
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# the smoothing of a spectrum comes back to its plan after some tenths of a second; a plan holds its arrays as long
+# the smoothing of a spectrum uses its plan again after some tenths of a second; until then, the plan occupies memory
 _KEEP_PLANS_S = 2.0
 
 
 def fft(values: Real) -> Complex:
-    """The transform (n,) of values (n,)."""
+    """Transforms values (n,) to (n,)."""
     with _fftw():
         return np.asarray(scipy.fft(values))
 
 
 def rfft2(values: Real, shape: tuple[int, int] | None = None) -> Complex:
-    """The half spectrum (ny, nx // 2 + 1) of real values (ny, nx), padded with zeros to a larger `shape` if given."""
+    """Transforms real values (ny, nx), padded with zeros to `shape`, to half of a spectrum (ny, nx // 2 + 1)."""
     with _fftw():
         return np.asarray(scipy.rfft2(values, s=shape))
 
 
 def irfft2(spectrum: Complex, shape: tuple[int, int]) -> Real:
-    """The real values of `shape` (ny, nx) whose half spectrum (ny, nx // 2 + 1) is given."""
+    """Transforms half of a spectrum, (ny, nx // 2 + 1), to real values of `shape` (ny, nx)."""
     with _fftw():
         return np.asarray(scipy.irfft2(spectrum, s=shape))
 
@@ -49,7 +50,7 @@ def _fftw() -> Iterator[None]:
 
 @cache
 def _prepare() -> None:
-    """Sets what pyFFTW's interfaces take from the process."""
+    """Configures pyFFTW's interfaces for this process."""
     pyfftw.config.PLANNER_EFFORT = "FFTW_ESTIMATE"
     pyfftw.interfaces.cache.enable()
     pyfftw.interfaces.cache.set_keepalive_time(_KEEP_PLANS_S)

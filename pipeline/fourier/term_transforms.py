@@ -1,8 +1,8 @@
-"""The transforms of a series' terms by FFTW, of the frequencies kept alone.
+"""Transforms of a series' terms by FFTW, pruned to the coefficients that are kept.
 
-A real transform goes along x, then a complex one along y over the columns that are kept, so that the others cost
-nothing. Plans are FFTW_MEASURE's. Each serves one thread, and several terms are transformed at once: threads within a
-transform of this size wait for each other, take up to ten times as long to plan, and tie a plan to a number of cores.
+A real transform along x is followed by a complex one along y over the columns that are kept. Plans are made by
+FFTW_MEASURE, for one thread each, and several terms are transformed at once: threads within a transform of this size
+wait for each other, take up to ten times as long to plan, and tie a plan to a number of cores.
 """
 
 import os
@@ -19,40 +19,43 @@ from kernels.dft_stack import Kept
 from pipeline.fourier import wisdom
 from pipeline.progress import Progress, silent
 
-# of all arrays that plans work in
+# limit for the arrays of all plans
 _MOST_BYTES = 2**30
 
 
-class KeptPlaces:
-    """Where the frequencies kept stand in the half spectrum of real samples (ny, nx).
+class KeptCoefficients:
+    """The indices of the kept coefficients in the half spectrum (ny, nx // 2 + 1) of real samples (ny, nx).
 
-    columns: how many columns of the half spectrum are read, from phi = 0 on.
+    columns: number of columns of the half spectrum that are read, from column 0.
     """
 
     def __init__(self, shape: tuple[int, int], kept: Kept) -> None:
         ny, nx = shape
         psi = np.arange(-kept.psi_max, kept.psi_max + 1)[:, None]
         phi = np.arange(-kept.reach, kept.phi_max + 1) % nx
-        # the half spectrum holds the rest as conjugates at the opposite frequency
+        # the other half consists of the conjugates at opposite frequencies
         opposite = phi > nx // 2
         self._row = np.where(opposite, -psi, psi) % ny
         self._column = np.where(opposite, nx - phi, phi)
         self._mean = 1.0 / (ny * nx)
-        # FFTW and scipy turn the other way than Stam: exp(-2 pi i f.x)
+        # FFTW and scipy transform with exp(-2 pi i f.x), [S99] with the opposite sign
         self._mean_imaginary = np.where(opposite, self._mean, -self._mean)
         self.columns = int(self._column.max()) + 1
 
     def put(self, spectrum: NDArray[Any], out: NDArray[Any]) -> None:
-        """Writes mean(term exp(+2 pi i f.x)) into `out` (psi, phi, 2) from `spectrum` (ny, `columns` or more)."""
+        """Extracts mean(term exp(+2 pi i f.x)) from a half spectrum.
+
+        spectrum: (ny, `columns` or more). out: receives real and imaginary parts, (psi, phi, 2).
+        """
         found = spectrum[self._row, self._column]
         out[:, :, 0] = self._mean * found.real
         out[:, :, 1] = self._mean_imaginary * found.imag
 
 
 class _Workspace:
-    """Plans for one term at a time, and the arrays that they work in."""
+    """The plans that transform one term at a time, and their arrays."""
 
-    def __init__(self, shape: tuple[int, int], places: KeptPlaces, real: np.dtype[Any]) -> None:
+    def __init__(self, shape: tuple[int, int], places: KeptCoefficients, real: np.dtype[Any]) -> None:
         ny, nx = shape
         complex_ = np.result_type(real, np.complex64)
         self._places = places
@@ -64,7 +67,7 @@ class _Workspace:
         self._along_y = pyfftw.FFTW(half[:, : places.columns], self._spectrum, axes=(0,), **measured)
 
     @staticmethod
-    def bytes(shape: tuple[int, int], places: KeptPlaces, real: np.dtype[Any]) -> int:
+    def bytes(shape: tuple[int, int], places: KeptCoefficients, real: np.dtype[Any]) -> int:
         ny, nx = shape
         return ny * real.itemsize * (nx + 2 * (nx // 2 + 1) + 2 * places.columns)
 
@@ -78,14 +81,17 @@ class _Workspace:
 
 
 def transform(terms: Iterable[NDArray[Any]], kept: Kept, out: NDArray[Any], progress: Progress = silent) -> None:
-    """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(term exp(+2 pi i f.x)) in its own precision.
+    """Computes mean(term exp(+2 pi i f.x)) of every term, at the coefficients that are kept.
 
-    terms: as many as `out` holds, each (ny, nx) with the origin of x and y at its first sample (np.fft.ifftshift puts
-    the middle sample there). A term is copied before the next is asked for, so one array may serve all of them.
+    terms: each (ny, nx), with the origin of x and y at its first sample (np.fft.ifftshift moves the middle sample
+        there). A term is copied before the next one is requested, so that one array may hold them all in turn.
+    kept: the coefficients. out: receives the result, float32 or float64 (psi, phi, 2, terms), whose precision is
+        used.
+    progress: called with the completed share.
     """
     count, left = out.shape[3], iter(terms)
     first = next(left)
-    places = KeptPlaces(first.shape, kept)
+    places = KeptCoefficients(first.shape, kept)
     room = _MOST_BYTES // _Workspace.bytes(first.shape, places, out.dtype)
     with wisdom.planning():
         at_once = max(1, min(os.cpu_count() or 1, count, room))

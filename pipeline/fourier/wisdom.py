@@ -1,7 +1,7 @@
-"""FFTW's wisdom, which is what it learned by measuring plans, kept in the user's cache folder.
+"""FFTW's wisdom (the results of measured planning), stored in the user's cache folder.
 
-A file belongs to one processor and to one version of pyFFTW and of FFTW. Wisdom is in force only while plans are made
-within `planning`; elsewhere there is none, so that plans which are not measured stay the same from run to run.
+A file belongs to one processor and to one version of pyFFTW and FFTW. Wisdom is in force only within `planning`, so
+that plans which are not measured stay the same from run to run.
 """
 
 import json
@@ -21,14 +21,14 @@ from pipeline.store import digest
 # in double, single and long double precision
 Wisdom = tuple[bytes, bytes, bytes]
 
-# the planner's wisdom is the process's, and so is what was learned where no file could be written
+# FFTW's wisdom is global in a process; _learned keeps it where no file can be written
 _lock = threading.Lock()
 _learned: list[Wisdom] = []
 
 
 @contextmanager
 def planning() -> Iterator[None]:
-    """Plans made within use what any process has learned here before; what is new is kept."""
+    """Puts stored wisdom into force for the plans that are made within, and stores what they add to it."""
     with _lock:
         kept = _read()
         pyfftw.forget_wisdom()
@@ -47,14 +47,14 @@ def planning() -> Iterator[None]:
 
 
 def file() -> Path:
-    """Where the wisdom of this processor and of these versions is kept."""
+    """Returns the file for this processor and these versions."""
     folder = Path(platformdirs.user_cache_dir("diffract-bake"))
     return folder / f"pyFFTW-{pyfftw.__version__}-{pyfftw.fftw_version}" / f"{digest.of_json(_processor())}.json"
 
 
 @cache
 def _processor() -> dict[str, str]:
-    """What tells one kind of processor from another."""
+    """Describes the model of the processor."""
     wanted = {"vendor_id", "cpu family", "model", "model name", "stepping", "cache size", "flags"}
     found = {"machine": platform.machine(), "processor": platform.processor()}
     try:
@@ -66,7 +66,7 @@ def _processor() -> dict[str, str]:
 
 
 def _read() -> Wisdom | None:
-    """The wisdom kept; None where there is none, or where it is not what was written."""
+    """Reads the stored wisdom; None where there is none, or where the file is damaged."""
     try:
         kept = json.loads(file().read_text(encoding="ascii"))
         double, single, longer = kept["wisdom"]
@@ -78,13 +78,13 @@ def _read() -> Wisdom | None:
 
 
 def _write(found: Wisdom) -> None:
-    """Keeps the wisdom. Of two processes that learn at once the later one's file stays: a plan is measured again."""
+    """Stores the wisdom. Of two processes that do so at once the later wins, and some plans are measured again."""
     texts = [text.decode("ascii") for text in found]
-    place = file()
-    beside = place.with_name(f"{place.stem}-{os.getpid()}.writing.json")
+    target = file()
+    temporary = target.with_name(f"{target.stem}-{os.getpid()}.writing.json")
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_text(json.dumps({"sha256": digest.of_json(texts), "wisdom": texts}), encoding="ascii")
-        beside.replace(place)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(json.dumps({"sha256": digest.of_json(texts), "wisdom": texts}), encoding="ascii")
+        temporary.replace(target)
     except OSError:
-        pass  # a cache that cannot be written only costs the next process its measurements
+        pass  # without a cache, the next process only has to measure again

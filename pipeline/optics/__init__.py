@@ -1,1 +1,1 @@
-"""Closed forms of physical optics and colour, one equation a function."""
+"""Closed forms of physical optics and colour, one function per equation."""

@@ -1,4 +1,4 @@
-"""The Gaussian window that spatial coherence puts on the surface, [D14] 4.2."""
+"""The Gaussian window of spatial coherence on the surface, [D14] sec. 4.2."""
 
 from math import ceil, log, pi, sqrt
 from typing import Annotated, Literal
@@ -9,13 +9,15 @@ from pydantic import Field
 from pipeline.arrays import Array
 from pipeline.validated import Validated
 
-# exp(-8.5^2 / 2) = 2e-16: beyond this many sigma the window is below float64's rounding of its peak
+# exp(-8.5^2 / 2) = 2e-16: beyond this multiple of sigma the window is below the rounding of its peak in float64
 BLIND_SIGMAS = 8.5
 
 
 class Coherence(Validated):
-    """The Gaussian window exp(-r^2 / (2 sigma^2)) of coherent light; 65 um = 4 sigma in [D14] 4.2.
+    """The window exp(-r^2 / (2 sigma^2)) of coherent light: a config's [coherence].
 
+    sigma_um: standard deviation, um; [D14] sec. 4.2 has 4 sigma = 65 um.
+    boundary: the patch repeats under the window.
     windows: "auto" averages |P|^2 over the windows that a larger scan holds (polar tables), "centre" takes one.
     """
 
@@ -25,27 +27,28 @@ class Coherence(Validated):
 
 
 def sigma_f(sigma_um: float) -> float:
-    """Width of the window's transform, 1/um: sigma_f = 1 / (2 pi sigma), [D14] eq. 8."""
+    """Computes the width of the window's transform, sigma_f = 1 / (2 pi sigma), 1/um ([D14] eq. 8)."""
     return 1.0 / (2.0 * pi * sigma_um)
 
 
 def window(x_um: Array, sigma_um: float) -> Array:
-    """g(x) = exp(-x^2 / (2 sigma^2)), one axis of the separable window."""
+    """Evaluates g(x) = exp(-x^2 / (2 sigma^2)), one axis of the separable window, at x_um (...,)."""
     return np.asarray(np.exp(-0.5 * (x_um / sigma_um) ** 2))
 
 
 def reach_sigmas(tolerance: float) -> float:
-    """How many sigma_f of neighbouring DFT coefficients matter, for amplitudes to `tolerance`.
+    """Computes where the window's transform has fallen to `tolerance` of its peak, in units of sigma_f.
 
-    Cut where the window's transform has fallen to `tolerance` of its peak. [D14] sec. 5 uses 4 (3e-4).
+    DFT coefficients farther away can be omitted. [D14] sec. 5 uses 4, for a tolerance of 3e-4.
     """
     return sqrt(2.0 * log(1.0 / tolerance))
 
 
 def folded_window(n: int, pitch_um: float, sigma_um: float, f_per_um: float) -> np.ndarray:
-    """sum_m g(x + m L) exp(2 pi i f (x + m L)) at the n samples x of one period L, complex128 (n,).
+    """Sums the modulated window over all copies of a patch that repeats under it ([D14] eq. 8), along one axis.
 
-    The patch repeats under the window ([D14] eq. 8), so a sample meets the window once in every copy.
+    n: samples per period. pitch_um: their distance, um. sigma_um: the window's, um. f_per_um: frequency, 1/um.
+    Returns sum_m g(x + m L) exp(2 pi i f (x + m L)) at the samples x of one period L, complex128 (n,).
     """
     period = n * pitch_um
     copies = ceil(BLIND_SIGMAS * sigma_um / period + 0.5)

@@ -1,6 +1,7 @@
-"""Light and observer as quadrature weights over wavelength."""
+"""Light and observer as weights of a quadrature over wavelength."""
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -9,29 +10,42 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pipeline.arrays import Array
 from pipeline.errors import InputError
-from pipeline.optics import colour_data
-from pipeline.optics.fresnel import read_columns
+from pipeline.optics.csv_columns import read_columns, shipped
 from pipeline.validated import Pair, Validated, existing_file, is_csv
 
+# the wavelengths, nm, that the CIE's observers of 1931 and 1964 cover
+SHORTEST_NM, LONGEST_NM = 360, 830
 # the step, nm, at which integrals over wavelength have converged: docs/accuracy.md
 FINE_STEP_NM = 1.0
-# names colour-science certainly has; any other is looked up there, which costs its import
-_COMMON_ILLUMINANTS = frozenset({"A", "C", "D50", "D55", "D65", "D75", "E"})
-_COMMON_OBSERVERS = frozenset({"CIE 1931 2 Degree Standard Observer", "CIE 1964 10 Degree Standard Observer"})
+# columns of data/illuminants.csv; other names are looked up in colour-science, whose import takes 1.5 s
+_SHIPPED_ILLUMINANTS = ("A", "C", "D50", "D55", "D65", "D75")
+_SHIPPED_OBSERVERS = {
+    "CIE 1931 2 Degree Standard Observer": "cie_1931_2_degree.csv",
+    "CIE 1964 10 Degree Standard Observer": "cie_1964_10_degree.csv",
+}
 
 
 class LaserLine(Validated):
-    lambda_nm: Annotated[float, Field(ge=360, le=830)]
+    """Light of a single wavelength."""
+
+    lambda_nm: Annotated[float, Field(ge=SHORTEST_NM, le=LONGEST_NM)]
 
 
 class Light(Validated):
+    """The illuminant, the observer and the wavelengths of an integral: a config's [spectrum].
+
+    illuminant: a colour-science name, "E", a CSV of lambda_nm,power, or a laser line.
+    observer: the colour-science name of colour matching functions.
+    range_nm: limits of the integral, nm; without effect on a laser line.
+    """
+
     illuminant: str | LaserLine = "D65"
     observer: str = "CIE 1931 2 Degree Standard Observer"
     range_nm: Pair = (380.0, 780.0)
 
     @property
     def is_line(self) -> bool:
-        """Whether it is a laser line."""
+        """Whether the light is a laser line."""
         return isinstance(self.illuminant, LaserLine)
 
     @property
@@ -42,12 +56,15 @@ class Light(Validated):
     @field_validator("range_nm")
     @classmethod
     def visible(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if not 360 <= value[0] < value[1] <= 830:
-            raise ValueError(f"expected [from, to] within the observer's 360..830 nm, got {list(value)}")
+        """Requires ascending limits that the observers cover."""
+        if not SHORTEST_NM <= value[0] < value[1] <= LONGEST_NM:
+            limits = f"{SHORTEST_NM:g}..{LONGEST_NM:g} nm"
+            raise ValueError(f"expected [from, to] within the observer's {limits}, got {list(value)}")
         return value
 
     @model_validator(mode="after")
     def a_line_has_no_range(self) -> Self:
+        """Rejects a range that a laser line would ignore."""
         if isinstance(self.illuminant, LaserLine) and "range_nm" in self.model_fields_set:
             raise ValueError("range_nm has no meaning with a laser line; leave it out")
         return self
@@ -55,35 +72,36 @@ class Light(Validated):
     @field_validator("illuminant")
     @classmethod
     def known_illuminant(cls, value: str | LaserLine, info: ValidationInfo) -> str | LaserLine:
-        if isinstance(value, LaserLine) or value in _COMMON_ILLUMINANTS:
+        """Requires a name that has a spectrum, or an existing CSV."""
+        if isinstance(value, LaserLine) or value in (*_SHIPPED_ILLUMINANTS, "E"):
             return value
         if is_csv(value):
             return existing_file(value, info)
         import colour
 
         if value not in colour.SDS_ILLUMINANTS:
-            some = ", ".join(sorted(_COMMON_ILLUMINANTS))
+            some = ", ".join((*_SHIPPED_ILLUMINANTS, "E"))
             raise ValueError(f"unknown illuminant {value!r}; known: {some}, a .csv")
         return value
 
     @field_validator("observer")
     @classmethod
     def known_observer(cls, value: str) -> str:
-        if value not in _COMMON_OBSERVERS:
+        """Requires an observer whose colour matching functions are those of XYZ."""
+        if value not in _SHIPPED_OBSERVERS:
             from colour.colorimetry import MSDS_CMFS_STANDARD_OBSERVER
 
-            # colour's other matching functions are of cones or RGB primaries and give no XYZ
+            # the library's other matching functions are of cones or of RGB primaries
             if value not in MSDS_CMFS_STANDARD_OBSERVER:
-                some = ", ".join(sorted(_COMMON_OBSERVERS))
-                raise ValueError(f"unknown observer {value!r}; known: {some}")
+                raise ValueError(f"unknown observer {value!r}; known: {', '.join(_SHIPPED_OBSERVERS)}")
         return value
 
 
 @dataclass(frozen=True)
 class Quadrature:
-    """XYZ = sum_l |P|^2(l) weights[l]: the white of a mirror has Y = 1.
+    """A rule for XYZ = sum_l |P|^2(l) weights[l], under which a mirror's white has Y = 1.
 
-    lambda_nm: float64 (L,); weights: float64 (L, 3) for X, Y, Z.
+    lambda_nm: wavelengths (L,), nm, ascending. weights: (L, 3) for X, Y, Z.
     """
 
     lambda_nm: Array
@@ -91,13 +109,17 @@ class Quadrature:
 
     @property
     def lambda_min_nm(self) -> float:
+        """The shortest wavelength, nm."""
         return float(self.lambda_nm[0])
 
 
 def trapezoid(light: Light, step_nm: float) -> Quadrature:
-    """The trapezoidal rule of [D14] sec. 5: S xyzbar dl / sum S ybar dl on nodes `step_nm` apart.
+    """Makes the trapezoidal rule of [D14] sec. 5, with weights S xyzbar dl / sum S ybar dl.
 
-    A range that is not a whole number of steps gets slightly shorter ones. A laser line is one node.
+    light: illuminant S, observer xyzbar and range. step_nm: distance of the wavelengths, nm; a range that is not a
+        whole number of steps gets slightly shorter ones.
+    Returns the rule; that of a laser line has one wavelength.
+    Raises InputError where illuminant or observer do not cover the wavelengths.
     """
     if isinstance(light.illuminant, LaserLine):
         nodes = np.array([light.illuminant.lambda_nm])
@@ -114,17 +136,19 @@ def trapezoid(light: Light, step_nm: float) -> Quadrature:
 
 
 def illuminant_at(name: str, lambda_nm: Array) -> Array:
-    """Relative spectral power at wavelengths, linear between samples as CIE 15 has it for D65.
+    """Interpolates the relative spectral power of an illuminant, linearly as CIE 15 asks for D65.
 
-    Raises InputError where a CSV does not cover them or has no power.
+    name: as in Light. lambda_nm: (L,), nm.
+    Returns power (L,), its maximum 1.
+    Raises InputError where the samples do not cover the wavelengths, or have no power at any of them.
     """
     if name == "E":
         return np.ones_like(lambda_nm)
-    if name.lower().endswith(".csv"):
+    if is_csv(name):
         table = read_columns(Path(name).read_bytes(), 2, name)
         nodes, power = table[:, 0], table[:, 1]
     else:
-        nodes, power = colour_data.illuminant(name)
+        nodes, power = illuminant_samples(name)
     _require_covered(name, nodes, lambda_nm)
     values = np.interp(lambda_nm, nodes, power)
     if np.any(values < 0) or not np.any(values > 0):
@@ -136,14 +160,40 @@ def illuminant_at(name: str, lambda_nm: Array) -> Array:
 
 
 def observer_at(name: str, lambda_nm: Array) -> Array:
-    """Colour matching functions (L, 3) at wavelengths, linear between the 1 nm samples.
+    """Interpolates the colour matching functions of an observer linearly between samples 1 nm apart.
 
-    Raises InputError where they do not cover them: those of 2015 start at 390 nm.
+    name: as in Light. lambda_nm: (L,), nm.
+    Returns x_bar, y_bar, z_bar, (L, 3).
+    Raises InputError where the samples do not cover the wavelengths: those of 2015 start at 390 nm.
     """
-    nodes, values = colour_data.observer(name)
+    nodes, values = observer_samples(name)
     _require_covered(name, nodes, lambda_nm)
     columns = [np.interp(lambda_nm, nodes, values[:, c]) for c in range(3)]
     return np.stack(columns, axis=-1)
+
+
+@cache
+def illuminant_samples(name: str) -> tuple[Array, Array]:
+    """Returns the wavelengths (n,), nm, and the relative spectral power (n,) of a named illuminant."""
+    if name in _SHIPPED_ILLUMINANTS:
+        table = shipped("illuminants.csv", 1 + len(_SHIPPED_ILLUMINANTS))
+        return table[:, 0], table[:, 1 + _SHIPPED_ILLUMINANTS.index(name)]
+    import colour
+
+    found = colour.SDS_ILLUMINANTS[name]
+    return np.asarray(found.wavelengths, float), np.asarray(found.values, float)
+
+
+@cache
+def observer_samples(name: str) -> tuple[Array, Array]:
+    """Returns the wavelengths (n,), nm, and the colour matching functions (n, 3) of a named observer."""
+    if name in _SHIPPED_OBSERVERS:
+        table = shipped(_SHIPPED_OBSERVERS[name], 4)
+        return table[:, 0], table[:, 1:]
+    import colour
+
+    found = colour.MSDS_CMFS[name]
+    return np.asarray(found.wavelengths, float), np.asarray(found.values, float)
 
 
 def _require_covered(name: str, nodes: Array, lambda_nm: Array) -> None:

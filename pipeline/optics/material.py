@@ -1,4 +1,4 @@
-"""What a surface is made of, and how its radiance is normalised."""
+"""The material of a surface, and the normalisation of its radiance."""
 
 from typing import Annotated, Literal
 
@@ -8,6 +8,13 @@ from pipeline.validated import Validated, existing_file, is_csv
 
 
 class Material(Validated):
+    """Reflectance, shadowing and normalisation: a config's [material].
+
+    fresnel: the reflectance model; "none" is a perfect mirror. ior: refractive index, of "schlick" and "dielectric".
+    metal: "Au", or a CSV of lambda_nm,n,k, of "conductor". shadowing: whether the V-cavity term applies.
+    normalisation: "relative" ([D14] eq. 4), or "absolute": a BRDF in 1/sr.
+    """
+
     fresnel: Literal["none", "schlick", "dielectric", "conductor"] = "schlick"
     ior: Annotated[float, Field(gt=1, le=5)] = 1.5
     metal: str = "Au"
@@ -17,6 +24,7 @@ class Material(Validated):
     @field_validator("metal")
     @classmethod
     def known_metal(cls, value: str, info: ValidationInfo) -> str:
+        """Requires gold or an existing CSV."""
         if is_csv(value):
             return existing_file(value, info)
         if value != "Au":

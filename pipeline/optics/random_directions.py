@@ -1,4 +1,4 @@
-"""Random pairs of light and view: what errors are stated over."""
+"""Random pairs of light and view, over which errors are stated."""
 
 import numpy as np
 
@@ -6,12 +6,16 @@ from pipeline.arrays import Array
 from pipeline.optics import geometry
 from pipeline.optics.scene import Scene
 
-# the rim itself is left out: cos -> 0 there
+# the horizon is omitted, where G grows like 1 / cos
 _WIDEST_DEG = 88.0
 
 
 def random_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Array]:
-    """Pairs of directions (count, 3) uniform over the projected hemisphere, or over the scene's lights and views."""
+    """Draws pairs of light and view, uniform over the projected hemisphere or over a scene.
+
+    scene: its lights and the cone of its views; None for the hemisphere. count: number of pairs. seed: of the draw.
+    Returns unit vectors wi, wr, (count, 3) each.
+    """
     rng = np.random.default_rng(seed)
     theta_max = 90.0 if scene is None else scene.views.theta_max_deg
     widest = np.sin(np.radians(min(theta_max, _WIDEST_DEG)))

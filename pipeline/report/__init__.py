@@ -1,1 +1,1 @@
-"""Pictures and pages that people look at."""
+"""Image files, and text from templates."""

@@ -1,4 +1,4 @@
-"""Pictures on disk: EXR for numbers, PNG for eyes."""
+"""Image files: EXR for numbers, PNG for display."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,28 +12,37 @@ from pipeline.errors import StorageError
 
 # ISO interop ID of linear CIE XYZ, D65 white: without it many readers take Y for luminance and Z for depth
 _XYZ_SPACE = "lin_ciexyzd65_scene"
-# of tables: GPUs have no three-channel half float
+# the channels of tables: GPUs have no format of three half floats
 RGBA = ("R", "G", "B", "A")
 
 
 def write_xyz(path: Path, image: Array) -> None:
-    """An XYZ image (rows, columns, 3) as float32 EXR channels brdf.X, brdf.Y, brdf.Z, first row on top.
+    """Writes an XYZ image as an EXR with the float32 channels brdf.X, brdf.Y, brdf.Z.
 
-    Raises StorageError.
+    path: the file. image: (rows, columns, 3), top row first.
+    Raises StorageError where the file cannot be written.
     """
     write_exr(path, {f"brdf.{name}": image[..., c].astype(np.float32) for c, name in enumerate("XYZ")}, _XYZ_SPACE)
 
 
 def write_rgba(path: Path, pixels: NDArray[Any]) -> None:
-    """A table (rows, columns, RGBA) in float32 or float16, row 0 on top, as data. Raises StorageError."""
+    """Writes a table as an EXR whose colour space is "data".
+
+    path: the file. pixels: float32 or float16 (rows, columns, 4), top row first.
+    Raises StorageError where the file cannot be written.
+    """
     write_exr(path, {name: pixels[..., c] for c, name in enumerate(RGBA)}, "data")
 
 
 def write_exr(path: Path, channels: Mapping[str, NDArray[Any]], colour_space: str) -> None:
-    """Planes (rows, columns) in float32 or float16 by channel name, first row on top. Raises StorageError.
+    """Writes an EXR with ZIP compression.
 
-    ZIP: 51 tables of 501 x 501 floats take 2 s and 70 % of their raw size (none 0.7 s, 100 %; PIZ 7 s, 76 %).
-    A second thread wins only 5 %. ZSTD takes 55 %, but readers before OpenEXR 3.5 do not know it.
+    ZIP compresses 51 tables of 501 x 501 floats to 70 % in 2 s (uncompressed 0.7 s; PIZ 7 s, to 76 %). A second
+    thread gains only 5 %. ZSTD compresses to 55 %, but readers before OpenEXR 3.5 do not support it.
+
+    path: the file. channels: float32 or float16 (rows, columns) by name, top row first. colour_space: the ISO interop
+        ID.
+    Raises StorageError where the file cannot be written.
     """
     import OpenEXR
 
@@ -42,7 +51,7 @@ def write_exr(path: Path, channels: Mapping[str, NDArray[Any]], colour_space: st
         "type": OpenEXR.scanlineimage,
         "colorInteropID": colour_space,
     }
-    # OpenEXR.File replaces arrays in the dict it is given: this one is its own
+    # OpenEXR.File replaces arrays in the dict that it is given: this is a copy
     planes = {name: np.ascontiguousarray(plane) for name, plane in channels.items()}
     try:
         OpenEXR.File(header, planes).write(str(path))
@@ -51,7 +60,7 @@ def write_exr(path: Path, channels: Mapping[str, NDArray[Any]], colour_space: st
 
 
 def read_xyz(path: Path) -> NDArray[np.float32]:
-    """The image (rows, columns, 3) that `write_xyz` wrote."""
+    """Reads an image that `write_xyz` wrote, (rows, columns, 3), top row first."""
     import OpenEXR
 
     with OpenEXR.File(str(path), separate_channels=True) as file:
@@ -60,9 +69,9 @@ def read_xyz(path: Path) -> NDArray[np.float32]:
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """Width, height, channel names (sorted) and pixel type ("float", "half", "uint", "mixed") of an EXR.
+    """Returns the width, height, sorted channel names and pixel type ("float", "half", "uint", "mixed") of an EXR.
 
-    Raises RuntimeError where the file is none.
+    Raises RuntimeError where the file is not an EXR.
     """
     import OpenEXR
 
@@ -79,7 +88,7 @@ def describe(path: Path) -> dict[str, Any]:
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """8-bit sRGB pixels (rows, columns, 3)."""
+    """Writes 8-bit sRGB pixels (rows, columns, 3), top row first."""
     from PIL import Image
 
     Image.fromarray(pixels, "RGB").save(path)

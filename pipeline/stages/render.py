@@ -9,7 +9,7 @@ from pipeline import layouts
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import pixels
+from pipeline.optics.colour import pixels
 from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# a chunk is what one read fetches: smaller ones cost zarr more time than their bytes; a shard is what one file holds
-# and what is put together in memory: larger ones cost more time than the files they save
+# chunks are the units of reading: zarr's overhead dominates smaller ones. Shards are the files, and are assembled in
+# memory: larger ones cost more time than fewer files save
 _CHUNK_BYTES = 2**22
 _SHARD_BYTES = 2**23
 
 
 @dataclass(frozen=True)
 class Named:
-    """An array of one axis or more, with the axes' names and its unit ("1" where it has none)."""
+    """An array with the names of its axes (at least one) and its unit ("1" for dimensionless values)."""
 
     values: NDArray[Any]
     axes: tuple[str, ...]
@@ -25,7 +25,10 @@ class Named:
 
 
 def save(folder: Path, arrays: Mapping[str, Named], attributes: Mapping[str, Any]) -> None:
-    """Writes a zarr group of named arrays; every chunk carries a CRC-32C."""
+    """Writes a zarr group whose chunks carry a CRC-32C.
+
+    folder: of the group. arrays: by name. attributes: of the group, as JSON.
+    """
     import zarr
     from zarr.codecs import Crc32cCodec
 
@@ -44,21 +47,21 @@ def save(folder: Path, arrays: Mapping[str, Named], attributes: Mapping[str, Any
 
 
 def load(folder: Path, name: str) -> NDArray[Any]:
-    """One array of a group, whole."""
+    """Reads one array of a group into memory."""
     import zarr
 
     return np.asarray(zarr.open_group(folder, mode="r")[name])
 
 
 def attributes(folder: Path) -> dict[str, Any]:
-    """The attributes of a group."""
+    """Reads the attributes of a group."""
     import zarr
 
     return dict(zarr.open_group(folder, mode="r").attrs)
 
 
 def _tiling(values: NDArray[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Chunk and shard shapes: whole trailing axes, so many leading rows as fit."""
+    """Chooses the shapes of chunks and shards: whole trailing axes, and as many rows of the first axis as fit."""
     shape = tuple(max(1, n) for n in values.shape)
     row = max(1, values.nbytes // shape[0])
     chunk_rows = min(shape[0], max(1, _CHUNK_BYTES // row))

@@ -1,4 +1,4 @@
-"""Folders being written, named after their writer: a killed run's leavings are told from work in progress."""
+"""Temporary folders, named after the process that writes them, so that those of killed processes can be removed."""
 
 import contextlib
 import os
@@ -16,9 +16,9 @@ _FOREIGN_ABANDONED_AFTER_S = 24 * 3600.0
 
 
 def make(parent: Path, prefix: str = "") -> Path:
-    """A new folder `<prefix><pid>@<host>-<random>` under `parent`.
+    """Makes a new folder `<prefix><pid>@<host>-<random>` under `parent`.
 
-    Not mkdtemp's, which would hide what it becomes from other users: the umask decides who reads it.
+    Its permissions follow the umask. mkdtemp's would hide the results from other users.
     """
     folder = parent / f"{prefix}{os.getpid()}@{platform.node()}-{uuid.uuid4().hex}"
     folder.mkdir(parents=True)
@@ -26,7 +26,7 @@ def make(parent: Path, prefix: str = "") -> Path:
 
 
 def abandoned(folder: Path, prefix: str = "") -> bool:
-    """Whether the folder's writer is gone; one on another machine counts as gone after a day without a change."""
+    """Whether the process that wrote a folder has ended; on another machine, after a day without a change."""
     pid, _, rest = folder.name.removeprefix(prefix).partition("@")
     if rest.rpartition("-")[0] == platform.node() and pid.isdigit():
         return not _alive(int(pid))
@@ -37,7 +37,7 @@ def abandoned(folder: Path, prefix: str = "") -> bool:
 
 
 def remove_abandoned(parent: Path, prefix: str) -> None:
-    """What killed runs left under `parent`."""
+    """Removes the folders of processes that were killed, below `parent`."""
     for folder in parent.glob(f"{prefix}*"):
         if abandoned(folder, prefix):
             shutil.rmtree(folder, ignore_errors=True)
@@ -45,7 +45,7 @@ def remove_abandoned(parent: Path, prefix: str) -> None:
 
 @contextlib.contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
-    """A scratch folder whose files take their places in `folder`, each by one rename, when it is left unharmed."""
+    """Yields a temporary folder whose files are renamed into `folder`, one by one, if the block raises nothing."""
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder, _REPLACING)
     scratch = make(folder, _REPLACING)
@@ -58,10 +58,10 @@ def replacing(folder: Path) -> Iterator[Path]:
 
 
 def require_folder(folder: Path) -> None:
-    """Better told before the work than after it, and nothing is made yet. Raises StorageError."""
-    standing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not (standing.is_dir() and os.access(standing, os.W_OK | os.X_OK)):
-        raise StorageError(f"{folder}: cannot be written, for {standing} is no folder to write in; see --out")
+    """Raises StorageError where a folder cannot be created or written, before any work; creates nothing."""
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
+        raise StorageError(f"cannot create {folder}: {existing} is not a writable directory; choose another --out")
 
 
 def _alive(pid: int) -> bool:
@@ -70,5 +70,5 @@ def _alive(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except PermissionError:
-        pass  # it is somebody else's, and alive
+        pass  # the process runs under another user
     return True

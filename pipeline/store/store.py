@@ -1,12 +1,12 @@
-"""The store: content-addressed artifacts, written beside and renamed into place.
+"""The store: content-addressed artifacts, which are written to a temporary folder and renamed into place.
 
-    <root>/<stage>/<key>/artifact.json    what it is, how it was made, the digest of every file
-    <root>/<stage>/<key>/...              its files
+    <root>/<stage>/<key>/artifact.json    stage, key, provenance, and the digest of every file
+    <root>/<stage>/<key>/...              files of the artifact
     <root>/tmp/...                        artifacts being written; never read
     <root>/locks/...                      one lock per artifact, so that two runs do not do the same work
 
-An artifact is visible only whole: its folder appears by one rename, after artifact.json was written last.
-So a run killed at any moment leaves at most a folder under tmp/, which nothing reads and `collect` removes.
+artifact.json is written last, and then the folder appears by one rename: only complete artifacts are visible. A run
+that is killed leaves at most a folder under tmp/, which `collect` removes.
 """
 
 import contextlib
@@ -47,54 +47,58 @@ _KEY = re.compile("[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class Artifact:
-    """One finished artifact: its folder and its record."""
+    """A complete artifact: its folder and its record (artifact.json)."""
 
     folder: Path
     record: dict[str, Any]
 
     @property
     def stage(self) -> str:
+        """Name of the stage that made it."""
         return str(self.record["stage"])
 
     @property
     def key(self) -> str:
+        """Its address, 64 hexadecimal digits."""
         return str(self.record["key"])
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What the stage measured and chose."""
+        """The values that the stage measured and chose."""
         return dict(self.record["summary"])
 
     @property
     def bytes(self) -> int:
+        """Size of all files."""
         return sum(int(entry["bytes"]) for entry in self.record["files"].values())
 
 
 def users_folder() -> Path:
-    """Where artifacts are kept unless told otherwise: $DIFFRACT_BAKE_STORE, or the user's cache folder."""
+    """Returns the default folder of artifacts: $DIFFRACT_BAKE_STORE, or one in the user's cache folder."""
     named = os.environ.get("DIFFRACT_BAKE_STORE")
     return Path(named) if named else Path(platformdirs.user_cache_dir("diffract-bake")) / "store"
 
 
 class Store:
-    """A folder of artifacts shared by any number of runs."""
+    """A folder of artifacts, which any number of runs can share."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
 
     def folder(self, stage: str, key: str) -> Path:
+        """Returns the folder of an artifact, whether it exists or not."""
         return self.root / stage / key
 
     def has(self, stage: str, key: str) -> bool:
-        """Whether an artifact stands under this key: folders appear whole. `open` checks its content."""
+        """Whether the artifact exists. Its files are checked by `open`."""
         return self.folder(stage, key).is_dir()
 
     def describe(self, stage: str, key: str) -> Artifact:
-        """The artifact with its record checked, its files not. Raises DamagedError."""
+        """Reads the record of an artifact and checks it, without its files. Raises DamagedError."""
         return self._read(self.folder(stage, key))
 
     def open(self, stage: str, key: str) -> Artifact:
-        """The artifact, every file checked against its digest. Raises DamagedError."""
+        """Reads the record of an artifact and checks every file against its digest. Raises DamagedError."""
         artifact = self._read(self.folder(stage, key))
         faults = _faults(artifact)
         if faults:
@@ -103,7 +107,7 @@ class Store:
 
     @contextlib.contextmanager
     def lock(self, stage: str, key: str) -> Iterator[None]:
-        """Holds the right to make one artifact; another run that wants it waits here."""
+        """Holds the lock of one artifact; other runs wait for it. Raises StorageError where it cannot be written."""
         lock = FileLock(self.root / "locks" / f"{stage}-{key}.lock")
         with writing(self.root):
             (self.root / "locks").mkdir(parents=True, exist_ok=True)
@@ -115,10 +119,12 @@ class Store:
 
     @contextlib.contextmanager
     def create(self, stage: str, key: str, record: dict[str, Any]) -> Iterator[tuple[Path, dict[str, Any]]]:
-        """A folder to write an artifact into and its record to complete; renamed into place on leaving.
+        """Creates an artifact: yields a temporary folder for its files and its record, and then renames the folder.
 
-        On any error the folder is removed and nothing becomes visible. Raises StorageError where the disk
-        refuses.
+        On any error the folder is removed, and no artifact becomes visible.
+
+        stage, key: its address. record: entries of artifact.json, to which the block may add.
+        Raises StorageError where the files cannot be written.
         """
         with writing(self.root):
             folder = scratch.make(self.root / "tmp")
@@ -138,10 +144,10 @@ class Store:
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                 raise
-            # another run without our lock (another machine) was first; its artifact is as good
+            # a run that does not see the lock, on another machine, made the same artifact first
 
     def artifacts(self) -> list[Artifact]:
-        """All artifacts whose record can be read, by stage and key."""
+        """Lists the artifacts whose record can be read, by stage and key."""
         found = []
         for folder in self._folders():
             with contextlib.suppress(DamagedError):
@@ -149,11 +155,11 @@ class Store:
         return found
 
     def _folders(self) -> list[Path]:
-        """Every folder that is named as an artifact's: nothing else under the root is ours to judge or remove."""
+        """Lists the folders that are named like artifacts; the store neither judges nor removes any others."""
         return sorted(p for p in self.root.glob("*/*") if _KEY.fullmatch(p.name) and p.is_dir())
 
     def check(self) -> list[str]:
-        """One line for every artifact that is not what it was when it was written."""
+        """Checks all artifacts; returns one line for each that has changed since it was written."""
         faults = []
         for folder in self._folders():
             try:
@@ -167,9 +173,10 @@ class Store:
         return faults
 
     def collect(self, keep_days: float | None) -> tuple[int, int]:
-        """Removes damaged and abandoned folders and, with `keep_days`, artifacts unused for longer.
+        """Removes damaged artifacts, temporary folders of killed runs, and artifacts unused for `keep_days` days.
 
-        Returns the number of folders removed and the bytes they held.
+        keep_days: None keeps all artifacts that are not damaged.
+        Returns the number of removed folders and their size in bytes.
         """
         now = time.time()
         doomed = [p for p in self.root.glob("tmp/*") if scratch.abandoned(p)]
@@ -186,7 +193,7 @@ class Store:
         return len(doomed), freed
 
     def touch(self, stage: str, key: str) -> None:
-        """Notes that an artifact was used, for `collect`."""
+        """Records the time of an artifact's last use, for `collect`."""
         with contextlib.suppress(OSError):
             os.utime(self.folder(stage, key) / RECORD)
 
@@ -207,7 +214,7 @@ class Store:
 
 
 def _age_s(path: Path, now: float) -> float:
-    """Seconds since a path was last written; 0 where it is gone by now."""
+    """Computes the seconds since a path was last written; 0 where it no longer exists."""
     try:
         return now - path.stat().st_mtime
     except FileNotFoundError:
@@ -222,7 +229,7 @@ def _seal(folder: Path, record: dict[str, Any]) -> None:
 
 
 def _faults(artifact: Artifact) -> list[str]:
-    """What differs between an artifact's files and its record."""
+    """Lists the differences between an artifact's files and its record."""
     expected, found = artifact.record["files"], digest.of_folder(artifact.folder)
     found.pop(RECORD, None)
     faults = [f"{name} is missing" for name in expected if name not in found]
@@ -236,21 +243,22 @@ def _damage(folder: Path, faults: list[str]) -> str:
 
 
 @contextlib.contextmanager
-def writing(place: Path) -> Iterator[None]:
-    """Turns the system's refusals to write under `place` into one StorageError; faults elsewhere stay as they are."""
+def writing(folder: Path) -> Iterator[None]:
+    """Turns errors of the system when writing below `folder` into a StorageError; other errors pass unchanged."""
     try:
         yield
     except OSError as error:
         if error.errno in FULL:
-            raise StorageError(f"{place}: no space left to write; free some, or choose another place") from None
-        if error.errno in _REFUSALS and _concerns(error, place):
-            raise StorageError(f"{place}: cannot be written ({os.strerror(error.errno)}); choose another") from None
+            raise StorageError(f"{folder}: no space left to write; free some, or choose another folder") from None
+        if error.errno in _REFUSALS and _concerns(error, folder):
+            reason = os.strerror(error.errno)
+            raise StorageError(f"{folder}: cannot be written ({reason}); choose another folder") from None
         raise
 
 
-def _concerns(error: OSError, place: Path) -> bool:
-    """Whether a fault names a path at or below `place`, or above it where that does not stand, or none."""
+def _concerns(error: OSError, folder: Path) -> bool:
+    """Whether an error names no path, or one that contains `folder` or lies in it."""
     if error.filename is None:
         return True
     named = Path(os.fsdecode(error.filename))
-    return named.is_relative_to(place) or place.is_relative_to(named)
+    return named.is_relative_to(folder) or folder.is_relative_to(named)

@@ -1,1 +1,1 @@
-"""Height fields: read from scans or made from recipes, cleaned and measured."""
+"""Height fields: read from scans or made from recipes, conditioned and measured."""

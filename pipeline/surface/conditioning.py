@@ -1,7 +1,6 @@
-"""From a scan as read to a surface fit for diffraction: levelled, clipped, without holes, centred.
+"""Conditions a scan for diffraction: levels it, clips it, fills its holes and centres it, in this order.
 
-Statistics are taken from valid samples only, so the order is: level, clip, fill holes, centre. A hole is
-then filled from neighbours that are already free of tilt and dust.
+Levelling and clipping use valid samples only. Holes are therefore filled last, from neighbours without tilt and dust.
 """
 
 from collections.abc import Iterator
@@ -22,18 +21,18 @@ LEVELS = ("none", "plane", "quadratic", "rows")
 
 @dataclass(frozen=True)
 class ConditioningRecord:
-    """What was done to a scan; every value is JSON-able.
+    """The changes made to a scan; every value can be written as JSON.
 
-    holes: samples without a height, filled by harmonic interpolation; hole_share: of all samples.
-    level: what was subtracted: "none", "plane", "quadratic" or "rows".
-    slope_deg: tilt removed along (x, y) at the patch's centre.
-    curvature_per_um: second derivatives removed, (xx, xy, yy).
-    row_offset_rms_um: rms of the row medians removed, about their mean.
-    removed_rms_um: rms of all that was subtracted, about its mean.
-    clip_percentile: percentiles asked for; clip_um: the heights they are, after levelling, before centring.
-    clipped_low, clipped_high: samples moved to a limit; clipped_share: their share of the valid samples.
-    range_before_um, range_after_um: peak to valley before and after the clip; range_kept: their ratio.
-    centre_um: the mid-range that was subtracted last.
+    holes: samples without a height, filled by harmonic interpolation. hole_share: their share of all samples.
+    level: the background that was subtracted: "none", "plane", "quadratic" or "rows".
+    slope_deg: slope subtracted along (x, y) at the middle of the patch, degrees.
+    curvature_per_um: second derivatives subtracted, (xx, xy, yy), 1/um.
+    row_offset_rms_um: standard deviation of the subtracted row medians.
+    removed_rms_um: standard deviation of the whole background.
+    clip_percentile: (low, high), percent. clip_um: the heights at these percentiles, after levelling.
+    clipped_low, clipped_high: samples moved to a limit. clipped_share: their share of the valid samples.
+    range_before_um, range_after_um: peak to valley before and after the clipping. range_kept: their ratio.
+    centre_um: middle of the height range, which was subtracted last.
     """
 
     holes: int
@@ -57,17 +56,18 @@ class ConditioningRecord:
 def condition(
     field: HeightField, level: str, clip_percentile: tuple[float, float] | None
 ) -> tuple[HeightField, ConditioningRecord]:
-    """The field levelled, clipped, filled and centred at mid-range, and the record of it.
+    """Levels, clips, fills and centres a height field.
 
-    field: heights in um; samples that are not finite are holes. level: one of LEVELS (see `_level`).
-    clip_percentile: (low, high) percentiles of the valid samples that heights are limited to, against dust.
+    field: heights, um; samples that are not finite are holes. level: one of LEVELS (see `_level`).
+    clip_percentile: (low, high) percentiles of the valid samples, to which heights are limited against dust.
+    Returns the conditioned field and the record of the changes.
     Raises InputError where no sample is valid; ValueError for an unknown level.
     """
     if level not in LEVELS:
         raise ValueError(f"expected one of {LEVELS}, got {level!r}")
     valid = np.isfinite(field.heights_um)
     if not valid.any():
-        raise InputError("expected heights, found none: every sample of the scan is a hole; choose another channel")
+        raise InputError("expected heights, found a hole in every sample of the scan; choose another channel")
     holes = int(valid.size - np.count_nonzero(valid))
     record = ConditioningRecord(holes, holes / valid.size, level)
     heights, record = _level(field, valid, record)
@@ -82,10 +82,10 @@ def condition(
 
 
 def _level(field: HeightField, valid: Mask, record: ConditioningRecord) -> tuple[Array, ConditioningRecord]:
-    """The heights less what `record.level` names.
+    """Subtracts the background that `record.level` names, and records it.
 
-    plane, quadratic: the least-squares polynomial of total degree 1, 2 in x and y. rows: the plane first,
-    then each row's own median, the usual cure for steps between scan lines (the fast axis is x).
+    plane, quadratic: the least-squares polynomial of total degree 1, 2 in x and y. rows: the plane, and then the
+    median of each row, which removes steps between scan lines (the fast axis is x).
     """
     heights = field.heights_um
     if record.level == "none":
@@ -108,11 +108,14 @@ def _level(field: HeightField, valid: Mask, record: ConditioningRecord) -> tuple
 def _polynomial(
     field: HeightField, valid: Mask, degree: int
 ) -> tuple[Array, tuple[float, float], tuple[float, float, float]]:
-    """Least-squares polynomial of the valid samples: its values (um), slopes (deg), curvatures (1/um)."""
+    """Fits a least-squares polynomial to the valid samples.
+
+    Returns its values (ny, nx), um, its slopes along (x, y), degrees, and its curvatures (xx, xy, yy), 1/um.
+    """
     (x, y), (pitch_x, pitch_y) = field.coordinates_um(), field.pitch_um
-    # on [-1, 1] the powers are of one size and the normal equations well conditioned
+    # on [-1, 1] all powers have one magnitude, and the normal equations are well conditioned
     scale_x, scale_y = max(pitch_x, -x[0]), max(pitch_y, -y[0])
-    # the mean goes first, so that a large offset costs no digits
+    # without its mean, heights with a large offset keep their digits
     mean = float(np.mean(field.heights_um, where=valid))
     heights = np.where(valid, field.heights_um - mean, 0.0)
     c = _fit(x / scale_x, y / scale_y, heights, valid, degree)
@@ -124,16 +127,17 @@ def _polynomial(
 
 
 def _fit(x: Array, y: Array, heights: Array, valid: Mask, degree: int) -> Array:
-    """Coefficients c[q, p] (3, 3) of sum c x^p y^q, p + q <= degree <= 2, nearest to `heights` (0 in holes).
+    """Fits sum c[q, p] x^p y^q with p + q <= degree <= 2 to `heights` (ny, nx), which are 0 in holes.
 
-    Sums of monomials over a grid separate into small matrix products: no design matrix of all samples.
+    Sums of monomials over a grid separate into small matrix products, so that no design matrix is needed.
+    x, y: coordinates (nx,), (ny,). Returns c (3, 3).
     """
     powers_x, powers_y = _powers(x, 2 * degree), _powers(y, 2 * degree)
     moments = powers_y.T @ (valid @ powers_x)
     right = powers_y.T @ (heights @ powers_x)
     terms = [(q, p) for q in range(degree + 1) for p in range(degree + 1 - q)]
     gram = np.array([[moments[q + s, p + r] for s, r in terms] for q, p in terms])
-    # least norm: what a single row, or holes, leave undetermined becomes 0
+    # lstsq returns the solution of least norm: terms that a single row, or holes, leave undetermined are 0
     solution = np.linalg.lstsq(gram, np.array([right[term] for term in terms]), rcond=None)[0]
     coefficients = np.zeros((3, 3))
     for term, value in zip(terms, solution, strict=True):
@@ -142,12 +146,12 @@ def _fit(x: Array, y: Array, heights: Array, valid: Mask, degree: int) -> Array:
 
 
 def _powers(x: Array, highest: int) -> Array:
-    """x^0 .. x^highest, (len(x), highest + 1)."""
+    """Returns the powers x^0 .. x^highest, (len(x), highest + 1)."""
     return np.vander(x, highest + 1, increasing=True)
 
 
 def _row_medians(heights: Array, valid: Mask) -> Array:
-    """Median of each row's valid samples, (ny,); 0, the plane's level, for a row that has none."""
+    """Computes the median of each row's valid samples, (ny,); 0, the level of the plane, for an empty row."""
     medians = np.zeros(heights.shape[0])
     whole = valid.all(axis=1)
     medians[whole] = np.median(heights[whole], axis=1)
@@ -162,7 +166,7 @@ def _row_medians(heights: Array, valid: Mask) -> Array:
 def _clip(
     heights: Array, valid: Mask, percentile: tuple[float, float] | None, record: ConditioningRecord
 ) -> tuple[Array, ConditioningRecord]:
-    """Heights limited to the percentiles of the valid samples."""
+    """Limits heights to percentiles of the valid samples, and records the change."""
     known = heights[valid]
     before = float(known.max() - known.min())
     if percentile is None:
@@ -187,13 +191,16 @@ def _clip(
 
 
 def fill_holes(heights_um: Array, valid: Mask, pitch_um: tuple[float, float]) -> Array:
-    """The heights with every invalid sample filled by Laplace's equation, um, shape unchanged.
+    """Fills holes by a solution of Laplace's equation.
 
-    Each filled sample is the mean of its four neighbours, weighted by 1/pitch^2 (beyond the patch's edge
-    there are none). A harmonic function has its extremes on the boundary: up to rounding, no filled height
-    lies outside the range of the valid samples around its hole. Valid samples are untouched; one must exist.
+    Each filled sample is the mean of its neighbours within the patch, weighted by 1 / pitch^2. A harmonic function
+    has its extremes on the boundary: up to rounding, no filled height lies outside the range of the valid samples
+    around its hole.
+
+    heights_um: (ny, nx), um. valid: bool (ny, nx), at least one sample true. pitch_um: along (x, y), um.
+    Returns (ny, nx), um, with unchanged valid samples.
     """
-    # sparse solvers take a tenth of a second to import, and most scans have no holes
+    # the import takes a tenth of a second, and most scans have no holes
     from scipy import sparse
     from scipy.sparse.linalg import spsolve
 
@@ -203,7 +210,7 @@ def fill_holes(heights_um: Array, valid: Mask, pitch_um: tuple[float, float]) ->
     number = np.full(hole.size, -1)
     number[unknown] = np.arange(unknown.size)
     diagonal, known = np.zeros(unknown.size), np.zeros(unknown.size)
-    # an empty first block: isolated holes have no links at all
+    # the first block is empty, because isolated holes have no links to other holes
     blocks = [sparse.csr_array((unknown.size, unknown.size))]
     for mine, there, weight in _neighbours(unknown, hole.shape, pitch_um):
         other = number[there]
@@ -221,13 +228,13 @@ def fill_holes(heights_um: Array, valid: Mask, pitch_um: tuple[float, float]) ->
 def _neighbours(
     samples: Index, shape: tuple[int, ...], pitch_um: tuple[float, float]
 ) -> Iterator[tuple[Index, Index, float]]:
-    """Links of some samples (flat indices) to the right, left, up and down, where the patch goes on there.
+    """Lists the neighbours of samples (flat indices) within the patch, for each of the four directions.
 
-    Yields which of the samples have one, the neighbours' flat indices, and the link's weight.
+    Yields which of the samples have a neighbour there, the neighbours' flat indices, and their weight.
     """
     ny, nx = shape
     j, i = np.divmod(samples, nx)
-    # only the ratio of weights matters; along the finer axis it is 1
+    # only the ratio of the weights matters: it is 1 along the finer axis
     finest = min(pitch_um)
     for dj, di in ((0, 1), (0, -1), (1, 0), (-1, 0)):
         mine = np.flatnonzero((j + dj >= 0) & (j + dj < ny) & (i + di >= 0) & (i + di < nx))

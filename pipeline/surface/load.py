@@ -1,4 +1,4 @@
-"""A scan file and the config's [surface] become one trusted height field in micrometres."""
+"""Loads a scan file as a height field in micrometres, with its values and units checked."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,21 +14,24 @@ from pipeline.surface.scan import Scan
 from pipeline.surface.source import SurfaceSource
 from pipeline.validated import as_pair
 
-# a config key may repeat what the file says, to this relative precision
+# relative tolerance within which a config key agrees with the value in the file
 _AGREES = 1e-3
 _PITCH_UM = (1e-4, 100.0)
 _RANGE_UM = (1e-6, 100.0)
 _OVERRIDE = "remove the key, or set surface.override_file_units = true"
 
-Source = Literal["file", "config"]
+# where a unit or a pitch was found
+Origin = Literal["file", "config"]
 
 
 @dataclass(frozen=True)
 class ScanRecord:
-    """Where a height field came from; JSON-able, and free of folders of this machine.
+    """The source of a height field; it can be written as JSON, and names no folder of this machine.
 
-    shape: samples (ny, nx). pitch_um: sample distance along (x, y), um. um_per_unit: micrometres per
-    stored unit or image code. The two `*_from` say whose value was used. holes: samples without a height.
+    file: its name. format, reader: the format in words, and the library that read it. channel, channels: the channel
+        read, and all that may hold heights.
+    shape: samples (ny, nx). pitch_um: sample distance along (x, y), um. um_per_unit: micrometres per stored unit or
+        image code. pitch_from, unit_from: the origin of these values. holes: number of samples without a height.
     """
 
     file: str
@@ -38,17 +41,19 @@ class ScanRecord:
     channels: tuple[str, ...]
     shape: tuple[int, int]
     pitch_um: tuple[float, float]
-    pitch_from: Source
+    pitch_from: Origin
     um_per_unit: float
-    unit_from: Source
+    unit_from: Origin
     holes: int
 
 
 def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
-    """The heights of surface.path in um, holes as NaN, and the record of how they were read.
+    """Loads the scan of `surface.path`; units in the file win over keys, unless `override_file_units` is set.
 
-    The file's units win over the config's keys. Raises InputError where the file cannot be read, a unit is
-    missing (naming every key to set) or contradicted, or the values cannot be a height map.
+    surface: a config's [surface].
+    Returns the field, um, with holes as NaN, and the record of its source.
+    Raises InputError where the file cannot be read, where units are missing (the message names every key to set) or
+    contradict each other, and where the values cannot be a height map.
     """
     if surface.path is None:
         raise ValueError("load_scan reads files; this surface is a recipe")
@@ -80,11 +85,11 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
 
 
 def _check_values(file: str, heights: NDArray[np.float64]) -> int:
-    """The number of holes. Raises InputError for a grid or for values that no height map has."""
+    """Counts the holes. Raises InputError for a shape or for values that no height map has."""
     check_shape(file, heights.shape)
     infinite = int(np.count_nonzero(np.isinf(heights)))
     if infinite:
-        raise fault(file, "finite heights", f"{infinite} infinite values", "write holes as NaN, mend the rest")
+        raise fault(file, "finite heights", f"{infinite} infinite values", "write holes as NaN, correct the others")
     holes = int(np.count_nonzero(np.isnan(heights)))
     if holes == heights.size:
         raise fault(file, "heights", "NaN everywhere", "export it again, or set surface.channel")
@@ -101,18 +106,18 @@ def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:
             file,
             f"a pitch within {low:g}..{high:g} um",
             f"{pitch_um[0]:.6g} x {pitch_um[1]:.6g} um",
-            "mislabelled units? set surface.pitch_um (against a file's own, with override_file_units = true)",
+            "mislabelled units? set surface.pitch_um (and override_file_units = true where the file states a pitch)",
         )
 
 
-def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Source], is_image: bool) -> None:
+def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Origin], is_image: bool) -> None:
     found = float(np.nanmax(heights_um) - np.nanmin(heights_um))
     if found == 0.0:
         raise fault(
             file,
             "heights that vary",
-            "one and the same height everywhere",
-            "if a mirror is meant, use surface.recipe = { kind = 'mirror' }",
+            "the same height everywhere",
+            "for a mirror use surface.recipe = { kind = 'mirror' }",
         )
     low, high = _RANGE_UM
     if not low <= found <= high:
@@ -121,7 +126,7 @@ def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, 
         raise fault(
             file,
             f"a height range within {low:g}..{high:g} um",
-            f"{found:.6g} um, taking 1 stored unit for {unit[0]:.6g} um (from the {unit[1]})",
+            f"{found:.6g} um, with {unit[0]:.6g} um per stored unit (from the {unit[1]})",
             f"mislabelled units? set {key}{override}",
         )
 
@@ -131,8 +136,11 @@ def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, 
 
 def _units(
     file: str, scan: Scan, surface: SurfaceSource
-) -> tuple[tuple[float, Source], tuple[tuple[float, float], Source]]:
-    """(um per stored unit, its source) and (pitch in um, its source); every missing key in one error."""
+) -> tuple[tuple[float, Origin], tuple[tuple[float, float], Origin]]:
+    """Determines (um per stored unit, its origin) and (pitch in um, its origin).
+
+    Raises InputError, which names every missing key at once.
+    """
     unit = _unit(file, scan, surface)
     pitch = _pitch(file, scan, surface)
     if unit is not None and pitch is not None:
@@ -147,24 +155,24 @@ def _units(
     raise fault(file, "units", f"a file ({scan.format}) that does not state them", f"set {' and '.join(missing)}")
 
 
-def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Source] | None:
+def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Origin] | None:
     if scan.full_code is not None:
         return _unit_of_image(file, scan.full_code, surface)
     if surface.height_range_um is not None:
         found = "surface.height_range_um, which is for 8- and 16-bit images"
         raise fault(file, "heights with a unit", found, "use surface.height_unit instead")
-    told = None if surface.height_unit is None else micrometres(surface.height_unit)
+    configured = None if surface.height_unit is None else micrometres(surface.height_unit)
     if scan.um_per_unit is None:
-        return None if told is None else (told, "config")
-    if told is None or _agree(told, scan.um_per_unit):
+        return None if configured is None else (configured, "config")
+    if configured is None or _agree(configured, scan.um_per_unit):
         return scan.um_per_unit, "file"
     if surface.override_file_units:
-        return told, "config"
+        return configured, "config"
     found = f"heights stored in {scan.um_per_unit:g} um, but surface.height_unit = '{surface.height_unit}'"
-    raise fault(file, "units that agree", f"{found} ({told:g} um)", _OVERRIDE)
+    raise fault(file, "units that agree", f"{found} ({configured:g} um)", _OVERRIDE)
 
 
-def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple[float, Source] | None:
+def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple[float, Origin] | None:
     if surface.height_unit is not None:
         found = f"surface.height_unit = '{surface.height_unit}', but an image holds codes 0..{full_code:g}"
         raise fault(file, "a height range", found, "set surface.height_range_um instead")
@@ -173,15 +181,15 @@ def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple
     return surface.height_range_um / full_code, "config"
 
 
-def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Source] | None:
-    told = None if surface.pitch_um is None else as_pair(surface.pitch_um)
+def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Origin] | None:
+    configured = None if surface.pitch_um is None else as_pair(surface.pitch_um)
     if scan.pitch_um is None:
-        return None if told is None else (told, "config")
-    if told is None or all(_agree(a, b) for a, b in zip(told, scan.pitch_um, strict=True)):
+        return None if configured is None else (configured, "config")
+    if configured is None or all(_agree(a, b) for a, b in zip(configured, scan.pitch_um, strict=True)):
         return scan.pitch_um, "file"
     if surface.override_file_units:
-        return told, "config"
-    found = f"{_pair(scan.pitch_um)} um in the file, but surface.pitch_um = {_pair(told)}"
+        return configured, "config"
+    found = f"{_pair(scan.pitch_um)} um in the file, but surface.pitch_um = {_pair(configured)}"
     raise fault(file, "pitches that agree", found, _OVERRIDE)
 
 

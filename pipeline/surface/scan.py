@@ -1,4 +1,4 @@
-"""What a reader takes out of a scan file, before any of it is trusted."""
+"""One channel of a scan file, as a reader returns it: values and units are not yet checked."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 class Scan:
     """One channel of a scan file, as stored.
 
-    heights: float64 (ny, nx), y **up** (row 0 is the bottom), NaN where the file marks a hole.
-    um_per_unit: micrometres per unit of `heights`; None where the file does not say.
-    pitch_um: sample distance along (x, y), um; None where the file does not say.
-    full_code: for images, the largest storable code (255, 65535); None elsewhere.
-    channel: the name of this channel; channels: the names of all height-like channels in the file.
-    format: the format in words; reader: the library and version that read it.
+    heights: float64 (ny, nx), y **upwards** (row 0 is the bottom), NaN where the file marks a hole.
+    um_per_unit: micrometres per unit of `heights`; None where the file does not state it.
+    pitch_um: sample distance along (x, y), um; None where the file does not state it.
+    full_code: the largest code that an image can store (255, 65535); None for other formats.
+    channel: the name of this channel. channels: the names of all channels that may hold heights.
+    format: the format in words. reader: the library that read it, with its version.
     """
 
     heights: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Where heights come from, and how they are cleaned: a scan file or a recipe."""
+"""The source of the heights, a scan file or a recipe, and the conditioning of a scan."""
 
 from typing import Literal, Self
 
@@ -11,7 +11,16 @@ Unit = Literal["pm", "nm", "um", "mm", "m"]
 
 
 class SurfaceSource(Validated):
-    """Either a scan file or a recipe, and how a scan is cleaned."""
+    """Either a scan file or a recipe: a config's [surface].
+
+    path: of the scan. channel: its name in the file; by default the height channel.
+    pitch_um: sample distance, um, one number or (x, y). height_unit: unit of the stored heights.
+    height_range_um: height, um, of an image's largest code above 0.
+    override_file_units: whether these three keys win over units that the file states.
+    level: the background that is subtracted; by default a plane from scans and nothing from recipes.
+    clip_percentile: (low, high) percentiles, %, to which heights are limited.
+    recipe: kind and parameters of a synthetic surface.
+    """
 
     path: str | None = None
     channel: str | None = None
@@ -25,6 +34,7 @@ class SurfaceSource(Validated):
 
     @model_validator(mode="after")
     def one_source(self) -> Self:
+        """Requires either a path or a recipe, and with a recipe no key that only a scan has."""
         if (self.path is None) == (self.recipe is None):
             found = "neither" if self.path is None else "both"
             raise ValueError(f"expected either 'path' (a scan) or 'recipe' (a synthetic surface), got {found}")
@@ -32,22 +42,24 @@ class SurfaceSource(Validated):
             reading = ("channel", "pitch_um", "height_unit", "height_range_um", "clip_percentile")
             set_keys = [key for key in reading if getattr(self, key) is not None]
             if set_keys:
-                raise ValueError(f"{', '.join(set_keys)}: only for a scan file; a recipe carries its own")
+                raise ValueError(f"{', '.join(set_keys)}: only for a scan file, got a recipe; remove these keys")
         return self
 
     @field_validator("clip_percentile")
     @classmethod
     def ordered(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        """Requires 0 <= low < high <= 100."""
         if value is not None and not 0 <= value[0] < value[1] <= 100:
             raise ValueError(f"expected [low, high] with 0 <= low < high <= 100, got {list(value)}")
         return value
 
     @field_validator("path")
     @classmethod
-    def scanexisting_file(cls, value: str | None, info: ValidationInfo) -> str | None:
+    def existing_scan(cls, value: str | None, info: ValidationInfo) -> str | None:
+        """Requires an existing file."""
         return None if value is None else existing_file(value, info)
 
     @property
     def levelling(self) -> str:
-        """A scan is levelled by a plane unless told otherwise; a recipe is exact as it is."""
+        """The background to subtract: `level`, by default a plane from a scan and nothing from a recipe."""
         return self.level or ("none" if self.recipe is not None else "plane")

@@ -15,7 +15,7 @@ from pipeline.bundle.manifest import Manifest, PolarGrid, PolarLoss
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, ConfigError
-from pipeline.optics.colour_error import ColourError, delta_e
+from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import run
 from pipeline.stages.polar import table as polar_table

@@ -12,14 +12,14 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from pipeline.accuracy import scalar_domain
 from pipeline.bundle import checksums
 from pipeline.bundle.manifest import Manifest, TaylorGrid
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
-from pipeline.optics import validity
 from pipeline.report import images
 from pipeline.stages.taylor import table as taylor_table
-from pipeline.surface.statistics import Period
+from pipeline.surface.periods import Period
 from pipeline.tables.taylor import grid
 
 from .conftest import SCENE, Baker, publish, small
@@ -88,10 +88,10 @@ def test_the_manifest_tells_errors_coverage_and_origin(bake: Baker, bundle: Path
 
 def test_the_scalar_models_domain_is_told(bake: Baker, bundle: Path) -> None:
     told, statistics = manifest_of(bundle).domain, bake(small())["surface"].summary["statistics"]
-    finest = validity.finest_period_um([Period(**period) for period in statistics["periods"]])
+    finest = scalar_domain.finest_period_um([Period(**period) for period in statistics["periods"]])
     assert told.lambda_nm == 550.0
     assert told.period_over_lambda == pytest.approx(finest / 0.55)
-    found = validity.place(finest, statistics["sigma_h_um"], 550.0)
+    found = scalar_domain.place(finest, statistics["sigma_h_um"], 550.0)
     assert (told.error_of_smooth, told.error_of_edged, told.within) == (found.smooth, found.edged, found.within)
     assert "The model is scalar" in (bundle / "README.md").read_text(encoding="utf-8")
 

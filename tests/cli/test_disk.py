@@ -30,7 +30,7 @@ def test_the_store_is_full(tool: Tool, small_disk: Path) -> None:
     cramped = replace(tool, store=small_disk / "store")
     result = cramped("run", cramped.config(surface={"recipe": {"kind": "sinusoid", "size_um": 40, "pitch_um": 0.1}}))
     refused(result)
-    assert "no space left to write; free some, or choose another place" in result.errors[0]
+    assert "no space left to write; free some, or choose another folder" in result.errors[0]
     assert leavings(cramped) == []
     assert cramped("store", "check").code == 0
     assert not cramped.out.exists()
@@ -69,7 +69,7 @@ def test_where_the_bundle_just_does_not_fit_it_is_not_there(baked: Tool, small_d
 def test_read_only(baked: Tool, small_disk: Path) -> None:
     result = baked("run", "small.toml", "--out", small_disk / "out")
     refused(result)
-    assert "cannot be written" in result.errors[0]
+    assert "is not a writable directory" in result.errors[0]
     result = replace(baked, store=small_disk / "store")("run", "small.toml")
     refused(result)
 

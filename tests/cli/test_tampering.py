@@ -99,7 +99,7 @@ def test_a_changed_bundle(copy: Tool, pattern: str) -> None:
 def test_an_unharmed_bundle(baked: Tool) -> None:
     result = baked("verify", baked.bundle())
     assert (result.code, result.stderr) == (0, "")
-    assert result.stdout == f"{baked.bundle()}: unharmed\n"
+    assert result.stdout == f"{baked.bundle()}: unchanged\n"
     assert baked("verify", baked.bundle(), "--json").json == {"bundle": str(baked.bundle()), "faults": []}
 
 

@@ -294,7 +294,7 @@ def test_a_light_to_render_must_be_one_of_the_scenes():
     left_out = scene_and_render([{"theta_deg": 30}], [{"theta_deg": 30}, {"theta_deg": 20}])
     found = faults(left_out)
     assert list(found) == ["render.lights.1"]
-    assert found["render.lights.1"].startswith("no light of [scene]")
+    assert found["render.lights.1"].startswith("expected a light of [scene]")
 
 
 def test_maps_without_lights_of_their_own_take_the_scenes():

@@ -1,5 +1,8 @@
 """Light and observer as quadratures: whites, spectral colours and what a rule of n nodes may miss."""
 
+import subprocess
+import sys
+
 import colour
 import numpy as np
 import pytest
@@ -7,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
+from pipeline.optics import light
 from pipeline.optics.light import LaserLine, Light, illuminant_at, observer_at, trapezoid
 
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
@@ -124,3 +128,30 @@ def test_observer_that_begins_late_is_refused():
         trapezoid(spectrum, 5.0)
     within = trapezoid(spectrum.model_copy(update={"range_nm": (390.0, 780.0)}), 5.0)
     assert within.weights[:, 1].sum() == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["A", "C", "D50", "D55", "D65", "D75", "FL2"])
+def test_illuminants_are_the_librarys(name):
+    """Shipped or not, every number is colour-science's."""
+    nodes, power = light.illuminant_samples(name)
+    np.testing.assert_array_equal(nodes, colour.SDS_ILLUMINANTS[name].wavelengths)
+    np.testing.assert_array_equal(power, colour.SDS_ILLUMINANTS[name].values)
+
+
+@pytest.mark.parametrize(
+    "name", [OBSERVER, "CIE 1964 10 Degree Standard Observer", "CIE 2015 2 Degree Standard Observer"]
+)
+def test_observers_are_the_librarys(name):
+    """Shipped or not, every number is colour-science's."""
+    nodes, values = light.observer_samples(name)
+    np.testing.assert_array_equal(nodes, colour.MSDS_CMFS[name].wavelengths)
+    np.testing.assert_array_equal(values, colour.MSDS_CMFS[name].values)
+
+
+def test_common_lights_do_not_import_colour_science():
+    """The import takes longer than a table."""
+    script = "import sys, pipeline.optics.light as light; light.trapezoid(light.Light(), 1.0); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    loaded = done.stdout.split()
+    assert "pipeline.optics.light" in loaded
+    assert "colour" not in loaded

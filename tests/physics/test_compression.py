@@ -11,7 +11,7 @@ from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.reference import Reference
 from pipeline.optics import brdf, geometry
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.optics.light import Light, trapezoid
 from pipeline.optics.material import Material
 from pipeline.tables.evaluate import Map

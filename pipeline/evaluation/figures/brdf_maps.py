@@ -23,7 +23,7 @@ from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Su
 from pipeline.evaluation.figures.method_runs import OURS, PAPER, on_elaphe
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.colour_error import pixels
+from pipeline.optics.colour import pixels
 from pipeline.progress import Progress
 from pipeline.surface import recipes
 from pipeline.surface.recipes.parameters import Blazed, CompactDisc

@@ -14,7 +14,7 @@ from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Su
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import geometry
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.colour_error import pixels
+from pipeline.optics.colour import pixels
 from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField

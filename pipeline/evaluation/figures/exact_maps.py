@@ -11,7 +11,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures.figure import Bench, Surface
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import DISPLAY_GAMMA, delta_e, displayed_srgb
+from pipeline.optics.colour import DISPLAY_GAMMA, delta_e, displayed_srgb
 from pipeline.progress import Progress
 from pipeline.surface.recipes.parameters import Blazed
 from pipeline.tables.evaluate import Map

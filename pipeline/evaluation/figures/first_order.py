@@ -17,7 +17,7 @@ from pipeline.evaluation.figures.figure import Surface
 from pipeline.evaluation.figures.peaks import Band, Plane, Power
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.method import Monochromatic
-from pipeline.optics.grating_equation import period_um, viewing_angle
+from pipeline.optics.gratings import period_um, viewing_angle
 from pipeline.optics.light import Light
 from pipeline.surface.heightfield import HeightField
 

@@ -12,7 +12,7 @@ from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Su
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.methods.paper_look_up import PUBLISHED_POWER, PUBLISHED_RESOLUTION
 from pipeline.evaluation.methods.paper_reference import TOLERANCE, taylor_stack
-from pipeline.optics.colour_error import delta_e, displayed_srgb, pixels
+from pipeline.optics.colour import delta_e, displayed_srgb, pixels
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map, table_evaluator
 from pipeline.tables.taylor import table as taylor

@@ -86,7 +86,7 @@ def _middles(count: int, side_mm: float) -> Array:
 
 def experiment(config: Config) -> Config:
     """The config of a surface under [D14]'s laser, aperture and gold."""
-    laser = str(files("pipeline.optics").joinpath("supercontinuum.csv"))
+    laser = str(files("pipeline.optics").joinpath("data", "supercontinuum.csv"))
     return config.model_copy(
         update={
             "coherence": Coherence(sigma_um=APERTURE_UM / 4.0),

@@ -14,7 +14,7 @@ from pipeline.evaluation.figures.method_runs import EXACT_NAME, OURS, on_elaphe,
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, Method
 from pipeline.evaluation.methods.nmm import Nmm
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.colour_error import delta_e, pixels
+from pipeline.optics.colour import delta_e, pixels
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map
 

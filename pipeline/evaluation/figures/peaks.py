@@ -1,7 +1,7 @@
 """Where a surface's first order stands in one plane of incidence: peaks of its reflectance, the lines behind them.
 
 Along the plane a view is named by f = (sin theta_i - sin phi) / lambda, 1/um: the frequency whose first order it
-meets (pipeline.optics.grating_equation), so that a peak at f is a period 1 / f.
+meets (pipeline.optics.gratings), so that a peak at f is a period 1 / f.
 
 Under a window of sigma a grating's order is a line exp(-(f - f0)^2 / sigma_f^2), and whatever multiplies it moves its
 peak by sigma_f^2 / 2 times the logarithmic slope: the factor C = F^2 G / (F0^2 w^2), and the order's own strength,
@@ -20,7 +20,7 @@ from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window, sigma_f
-from pipeline.optics.grating_equation import in_plane
+from pipeline.optics.gratings import in_plane
 from pipeline.optics.light import Quadrature
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField

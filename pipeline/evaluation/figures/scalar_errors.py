@@ -11,10 +11,11 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from pipeline.accuracy import scalar_domain
 from pipeline.arrays import Array
 from pipeline.evaluation.figures import coupled_wave
 from pipeline.evaluation.figures.coupled_wave import Profile
-from pipeline.optics import fresnel, geometry, gratings, validity
+from pipeline.optics import fresnel, geometry, gratings
 from pipeline.progress import Progress
 
 # aluminium at 633 nm (Rakic 1995); the default material's ior, its k a regularisation
@@ -50,7 +51,7 @@ class Shape:
         return gratings.blaze(float(_ORDER), s, depth)
 
 
-SHAPES = {"sinusoid": Shape(cosine, 24, validity.SMOOTH), "blaze": Shape(sawtooth, 16, validity.EDGED)}
+SHAPES = {"sinusoid": Shape(cosine, 24, scalar_domain.SMOOTH), "blaze": Shape(sawtooth, 16, scalar_domain.EDGED)}
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,10 @@ class Sweep:
         errors, periods, depths = self.largest(shape, what), np.array(self.periods), np.array(self.depths)
         return np.array(
             [
-                [np.max(errors[np.ix_(depths <= depth, periods >= period)], initial=0.0) for depth in validity.DEPTHS]
-                for period in validity.PERIODS
+                [
+                    np.max(errors[np.ix_(depths <= depth, periods >= period)], initial=0.0)
+                    for depth in scalar_domain.DEPTHS
+                ]
+                for period in scalar_domain.PERIODS
             ]
         )

@@ -24,7 +24,7 @@ from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.paper_look_up import PaperLookUp
 from pipeline.evaluation.methods.stam_gaussian import DiscWindow, StamGaussian
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import EXPOSURES_RU, delta_e
+from pipeline.optics.colour import EXPOSURES_RU, delta_e
 from pipeline.progress import Progress
 from pipeline.surface.heightfield import HeightField
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipeline.accuracy import scalar_domain
 from pipeline.arrays import Array
 from pipeline.evaluation.figures import coupled_wave
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
@@ -20,7 +21,6 @@ from pipeline.evaluation.figures.scalar_errors import (
     scalar,
     sweep,
 )
-from pipeline.optics import validity
 from pipeline.progress import Progress
 from pipeline.surface import statistics
 
@@ -152,10 +152,10 @@ def _domain_checks(found: Sweep, whole: bool) -> list[Check]:
     checks = []
     for name, shape in SHAPES.items():
         for period, quoted, measured in zip(
-            validity.PERIODS, shape.quoted, found.by_class(name, _error), strict=True
+            scalar_domain.PERIODS, shape.quoted, found.by_class(name, _error), strict=True
         ):
             holds = np.all(measured <= quoted) and (not whole or np.all(np.array(quoted) - measured <= _SLACK))
-            depths = " / ".join(f"{depth:g}" for depth in validity.DEPTHS)
+            depths = " / ".join(f"{depth:g}" for depth in scalar_domain.DEPTHS)
             checks.append(
                 Check(
                     f"{name}, periods from {period:g} λ on: largest error at depths up to {depths} λ",
@@ -170,12 +170,12 @@ def _domain_checks(found: Sweep, whole: bool) -> list[Check]:
 def _quoted_table() -> Table:
     rows = [
         (f"{name}, from {period:g} λ", *(f"{error:.2f}" for error in row))
-        for name, errors in (("smooth", validity.SMOOTH), ("edged", validity.EDGED))
-        for period, row in zip(validity.PERIODS, errors, strict=True)
+        for name, errors in (("smooth", scalar_domain.SMOOTH), ("edged", scalar_domain.EDGED))
+        for period, row in zip(scalar_domain.PERIODS, errors, strict=True)
     ]
     return Table(
         "The domain as quoted: largest error of a first order's efficiency, of the flat surface's reflectance",
-        ("relief and period", *(f"depth up to {depth:g} λ" for depth in validity.DEPTHS)),
+        ("relief and period", *(f"depth up to {depth:g} λ" for depth in scalar_domain.DEPTHS)),
         rows,
     )
 
@@ -190,11 +190,11 @@ def _obliquity_table(found: Sweep) -> Table:
         (f"{name}, {way}, from {period:g} λ", *(f"{error:.3f}" for error in row))
         for name in SHAPES
         for way, what in ways
-        for period, row in zip(validity.PERIODS[1::2], found.by_class(name, what)[1::2], strict=True)
+        for period, row in zip(scalar_domain.PERIODS[1::2], found.by_class(name, what)[1::2], strict=True)
     ]
     return Table(
         "With the BRDF's obliquity and without it: largest errors",
-        ("grating and period", *(f"depth up to {depth:g} λ" for depth in validity.DEPTHS)),
+        ("grating and period", *(f"depth up to {depth:g} λ" for depth in scalar_domain.DEPTHS)),
         rows,
     )
 
@@ -204,9 +204,9 @@ def _places_table(bench: Bench) -> Table:
     rows = []
     for surface in (bench.blazed, bench.elaphe, bench.xenopeltis):
         measured = statistics.measure(surface.field, surface.config.coherence.sigma_um, LAMBDA_MIN_NM)
-        finest = validity.finest_period_um(measured.periods)
+        finest = scalar_domain.finest_period_um(measured.periods)
         for nm in _PLACES_NM:
-            at = validity.place(finest, measured.sigma_h_um, nm)
+            at = scalar_domain.place(finest, measured.sigma_h_um, nm)
             rows.append(
                 (
                     f"{surface.name}, {nm:g} nm",
@@ -225,7 +225,7 @@ def _pictures(found: Sweep) -> list[Picture]:
     panels = list(product(SHAPES, INDICES))
     return [
         Picture(
-            validity_plots.error_maps([_error_panel(found, *each) for each in panels], validity.TOLERATED),
+            validity_plots.error_maps([_error_panel(found, *each) for each in panels], scalar_domain.TOLERATED),
             "The scalar model's error of the first order's efficiency, the largest of all lights. Above as "
             "a share of what the flat surface reflects, below relative to the rigorous value. Black line: 0.05. "
             "Dots: gratings solved.",
@@ -290,8 +290,8 @@ def _page(
         source="not in [D14] or [S14]; coupled waves: Moharam et al. 1995",
         expected="Kirchhoff's scalar model knows no polarisation and no light that meets a surface twice. It should "
         "agree with Maxwell's equations in long periods and shallow reliefs, and part from them as either comes "
-        f"near the wavelength. Its domain is where an order's efficiency errs by less than {validity.TOLERATED:g} of "
-        "what the flat surface reflects.",
+        "near the wavelength. Its domain is where an order's efficiency errs by less than "
+        f"{scalar_domain.TOLERATED:g} of what the flat surface reflects.",
         checks=checks,
         tables=tables,
         pictures=pictures,

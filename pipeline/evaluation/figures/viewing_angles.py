@@ -25,7 +25,7 @@ from pipeline.evaluation.figures.first_order import (
     variants,
     walk_of,
 )
-from pipeline.optics.grating_equation import viewing_angle
+from pipeline.optics.gratings import viewing_angle
 from pipeline.progress import Progress
 
 _STEP_NM, _QUICK_STEP_NM = 5.0, 20.0

@@ -19,7 +19,7 @@ from pipeline.evaluation.figures.exact_maps import (
 from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Surface, Table
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import delta_e, pixels
+from pipeline.optics.colour import delta_e, pixels
 from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map

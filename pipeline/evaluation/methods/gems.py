@@ -9,9 +9,9 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.errors import ConfigError
-from pipeline.optics import colour_data
+from pipeline.optics.colour import SRGB_TO_XYZ
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.statistics import dominant_periods
+from pipeline.surface.periods import dominant_periods
 
 # [G04]'s text has eight orders, its listing's loop n = 1 .. 7
 PUBLISHED_ORDERS = 8
@@ -64,7 +64,7 @@ class Gems:
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        return np.asarray(self._unit * self.rgb(wi, wr) @ colour_data.srgb().to_xyz.T)
+        return np.asarray(self._unit * self.rgb(wi, wr) @ SRGB_TO_XYZ.T)
 
     def rgb(self, wi: Array, wr: Array) -> Array:
         """The shader's own colour (directions, 3), linear, not clipped."""

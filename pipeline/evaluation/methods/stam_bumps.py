@@ -30,7 +30,7 @@ from pipeline.errors import ConfigError
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.light import trapezoid
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.statistics import dominant_periods
+from pipeline.surface.periods import dominant_periods
 
 PUBLISHED_EPSILON = 0.01  # [D14] sec. 6.3, fig. 11(a)
 PUBLISHED_SHARE = 0.5  # [D14] fig. 11: bumps are half as wide and as high as their period

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.accuracy.plots import png
 from pipeline.arrays import Array
-from pipeline.optics.colour_error import delta_e, pixels
+from pipeline.optics.colour import delta_e, pixels
 
 _ERRORS = (0.01, 100.0)
 # Okabe and Ito 2008

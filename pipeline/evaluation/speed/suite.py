@@ -19,7 +19,7 @@ from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of, timed
 from pipeline.evaluation.speed.transforms import Transforms
 from pipeline.evaluation.speed.truth import MapTruth
-from pipeline.optics.colour_error import ColourError
+from pipeline.optics.colour import ColourError
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar.compression import compress, most_textures, whole

@@ -14,7 +14,7 @@ from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.evaluation.speed.setting import AMPLITUDE, Setting
 from pipeline.evaluation.speed.timing import best_of
-from pipeline.fourier.term_transforms import KeptPlaces, transform
+from pipeline.fourier.term_transforms import KeptCoefficients, transform
 
 Precision = Literal["single", "double"]
 _REAL: dict[Precision, np.dtype[Any]] = {"single": np.dtype(np.float32), "double": np.dtype(np.float64)}
@@ -57,7 +57,7 @@ def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms
         return out
 
     def by_scipy() -> NDArray[Any]:
-        out, places = np.empty(shape, real), KeptPlaces(t.shape, kept)
+        out, places = np.empty(shape, real), KeptCoefficients(t.shape, kept)
         for n, term in zip(range(terms), _polynomials(t), strict=False):
             places.put(fft.rfft2(term.astype(real), workers=os.cpu_count()), out[..., n])
         return out

@@ -7,7 +7,7 @@ from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import ColourError, delta_e
+from pipeline.optics.colour import ColourError, delta_e
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import Map, table_evaluator

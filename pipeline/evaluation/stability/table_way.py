@@ -14,7 +14,7 @@ from pipeline.evaluation.stability.cell import SEED, Cell
 from pipeline.evaluation.stability.reading import NO_DIGITS
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import run, surface
 from pipeline.store.store import Store

@@ -1,7 +1,7 @@
-"""Readers of scan files: images, arrays and text as they are, microscopes' formats by libraries.
+"""Readers of scan files. `read_scan` recognises the format and calls its reader.
 
-`read_scan` is the way in. Libraries for microscopes are the extra `diffract-bake[readers]`, imported
-only when a file needs them.
+Images, arrays and text are read here, formats of microscopes by the libraries of the extra `diffract-bake[readers]`,
+which are imported only when a file needs them.
 """
 
 from pathlib import Path
@@ -21,10 +21,11 @@ _READERS = {
 
 
 def read_scan(path: Path, channel: str | None) -> Scan:
-    """One channel of a scan file; `channel` None takes the height channel.
+    """Reads one channel of a scan file, whose format is recognised by content.
 
-    The content decides the format, not the suffix. Raises InputError with one line where the file cannot
-    be opened, is of no known format, is damaged, or does not hold the channel.
+    path: the file. channel: name of the channel; None takes the height channel.
+    Returns the channel as stored.
+    Raises InputError where the file cannot be opened, has an unknown format, is damaged, or lacks the channel.
     """
     key = sniff(path)
     if key in spm.FORMATS:

@@ -1,4 +1,4 @@
-"""NumPy's .npy and .npz: 2-D arrays taken as they are, y up with the row index, no units."""
+"""Reads NumPy's .npy and .npz files: 2-D arrays with y upwards with the row, without units."""
 
 from pathlib import Path
 from typing import Any
@@ -13,17 +13,20 @@ _CHANNEL = "array"
 
 
 def read_npy(path: Path, channel: str | None) -> Scan:
-    """The one array of a .npy file. Raises InputError unless it is 2-D and of real numbers."""
+    """Reads the array of a .npy file. Raises InputError unless it is 2-D and has real numbers."""
     pick_channel(path.name, [_CHANNEL], channel)
     with third_party(path.name, "a NumPy .npy file", "numpy"):
-        # mapped, so that a shape which is refused costs no memory
+        # mapped into memory, so that a shape which is refused is not loaded
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
         heights = _heights(path, stored)
     return _scan(heights, _CHANNEL, [_CHANNEL], "NumPy .npy")
 
 
 def read_npz(path: Path, channel: str | None) -> Scan:
-    """The 2-D array of an .npz file that `channel` names; without a name, the only or the height one."""
+    """Reads the 2-D array of an .npz file that `channel` names; None takes the only one, or the one named as heights.
+
+    Raises InputError where there is no such array.
+    """
     with (
         third_party(path.name, "a NumPy .npz archive", "numpy"),
         np.load(path, allow_pickle=False) as archive,
@@ -39,7 +42,7 @@ def read_npz(path: Path, channel: str | None) -> Scan:
 
 
 def _matrices(archive: Any) -> dict[str, NDArray[Any]]:
-    """The 2-D arrays of an archive by name; what needs pickle or is no array is passed over."""
+    """Returns the 2-D arrays of an archive by name; members that are no arrays, or need pickle, are skipped."""
     arrays = {}
     for name in archive.files:
         try:

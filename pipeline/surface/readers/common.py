@@ -1,4 +1,4 @@
-"""What all readers share: units, limits of the grid, names of channels, and how a fault is told."""
+"""Functions that all readers share: units, limits of the shape, names of channels, and errors."""
 
 import re
 import warnings
@@ -21,7 +21,7 @@ _MICROMETRES = {
     "pm": 1e-6,
     "fm": 1e-9,
 }
-# the micro sign, the Greek letter, and what Nanoscope writes for either
+# the micro sign, the Greek letter mu, and "~", which Nanoscope writes for them
 _AS_MICRO = str.maketrans({"\u00b5": "u", "\u03bc": "u", "~": "u"})
 
 _HEIGHT_NAME = re.compile(r"height|topo|z[ _-]?(sensor|axis|scan)|^z\b", re.IGNORECASE)
@@ -29,27 +29,29 @@ _RETURN_NAME = re.compile(r"retrace|backward|bwd", re.IGNORECASE)
 
 
 def micrometres(unit: str) -> float | None:
-    """Micrometres per `unit`; None where it is no unit of length ("V", "deg", "")."""
+    """Converts a unit to micrometres; None for anything but a unit of length ("V", "deg", "")."""
     return _MICROMETRES.get(unit.strip().strip("[]()").translate(_AS_MICRO).replace("\u212b", "Å"))
 
 
 def one_line(text: str, limit: int = 200) -> str:
-    """The text without line breaks, cut to `limit` characters."""
+    """Removes line breaks from a text and shortens it to `limit` characters."""
     flat = " ".join(text.split())
     return flat if len(flat) <= limit else f"{flat[: limit - 3]}..."
 
 
 def fault(file: str, expected: str, found: str, way_out: str) -> InputError:
-    """The one shape of a reader's error: file, what was expected, what was found, the way out."""
+    """Returns a reader's error: the file, what was expected, what was found, and the remedy."""
     return InputError(f"{file}: expected {expected}, found {found}; {way_out}")
 
 
 @contextmanager
 def third_party(file: str, expected: str, library: str) -> Iterator[None]:
-    """Runs foreign code: no warning leaves it, and any exception becomes a InputError of one line.
+    """Runs a library's code without its warnings, and turns any of its exceptions into an InputError of one line.
 
-    `expected` is the format in words. Readers of instrument formats raise whatever a damaged byte leads
-    to (struct.error, KeyError, MemoryError, ...), hence the bare Exception.
+    On a damaged file, libraries raise whatever the damage leads to (struct.error, KeyError, MemoryError, ...): all
+    exceptions are therefore caught.
+
+    file: its name. expected: the format in words. library: the package's name.
     """
     try:
         with warnings.catch_warnings():
@@ -70,13 +72,13 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         raise fault(
             file,
             expected,
-            f"what {library} cannot read ({cause})",
+            f"content that {library} cannot read ({cause})",
             "the file may be damaged or cut short: copy or export it again",
         ) from None
 
 
 def library_version(library: str) -> str:
-    """`library` with its version, for the record of a scan."""
+    """Returns the name of a library with its version."""
     try:
         return f"{library} {version(library)}"
     except PackageNotFoundError:
@@ -84,9 +86,9 @@ def library_version(library: str) -> str:
 
 
 def check_shape(file: str, shape: Sequence[int]) -> None:
-    """Raises InputError unless `shape` is (ny, nx) with MIN_SAMPLES..MAX_SAMPLES along both axes.
+    """Requires a shape (ny, nx) with MIN_SAMPLES..MAX_SAMPLES along both axes; else raises InputError.
 
-    Readers call it before they decode, so that a header's claim costs no memory.
+    Readers call it before they decode, so that a wrong size in a header allocates no memory.
     """
     in_words = " x ".join(str(n) for n in shape) or "one number"
     if len(shape) != 2:
@@ -108,7 +110,7 @@ def check_shape(file: str, shape: Sequence[int]) -> None:
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
-    """The names in order, the second "Height" as "Height #2", so that each can be asked for."""
+    """Makes names unique, in order: the second "Height" becomes "Height #2"."""
     seen: dict[str, int] = {}
     unique = []
     for name in names:
@@ -118,9 +120,11 @@ def unique_names(names: Sequence[str]) -> list[str]:
 
 
 def pick_channel(file: str, names: Sequence[str], wanted: str | None) -> int:
-    """Index of the channel to read: the one wanted, else the first that a height is usually called.
+    """Chooses the channel to read: the one wanted, else the first that is named like heights, traces before retraces.
 
-    Traces (forward) come before retraces. Raises InputError where nothing or no single channel fits.
+    file: its name, for messages. names: of the channels. wanted: one of them, or None.
+    Returns an index into `names`.
+    Raises InputError where no channel fits, or more than one.
     """
     listed = ", ".join(repr(name) for name in names)
     if not names:

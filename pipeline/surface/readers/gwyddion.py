@@ -1,4 +1,4 @@
-"""Gwyddion's .gwy, by gwyfile."""
+"""Reads Gwyddion's .gwy files, by gwyfile."""
 
 import re
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _DATA_KEY = re.compile(r"/(\d+)/data")
 
 @dataclass(frozen=True)
 class _Field:
-    """One data field: its name, the field object, and micrometres per unit of its values."""
+    """One data field: its name, gwyfile's object, and micrometres per unit of its values."""
 
     name: str
     data: Any
@@ -32,10 +32,9 @@ class _Field:
 
 
 def read(path: Path, channel: str | None) -> Scan:
-    """One data field, flipped: Gwyddion stores the top row first.
+    """Reads one data field and flips it, because Gwyddion stores the top row first.
 
-    A field whose units are empty keeps None for them. Masks are the user's marks, of grains as often as
-    of bad data, and make no holes.
+    Empty units become None. Masks make no holes: they mark grains as often as bad data.
     """
     with third_party(path.name, "a Gwyddion .gwy file", "gwyfile"):
         import gwyfile
@@ -58,7 +57,7 @@ def read(path: Path, channel: str | None) -> Scan:
 
 
 def _height_fields(container: Any) -> list[_Field]:
-    """Fields in a unit of length or in none at all, in the order of their numbers."""
+    """Lists the fields in a unit of length or without a unit, in the order of their numbers."""
     numbers = sorted(int(match[1]) for key in container if (match := _DATA_KEY.fullmatch(key)))
     fields = []
     for number in numbers:

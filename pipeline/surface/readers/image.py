@@ -1,4 +1,4 @@
-"""Grey images as height maps: codes 0..full_code, first row at the top, no units."""
+"""Reads grey images as height maps: codes 0..full_code, the first row at the top, without units."""
 
 from pathlib import Path
 
@@ -24,10 +24,9 @@ _PHOTOMETRIC, _WHITE_IS_ZERO = 262, 0
 
 
 def read(path: Path, channel: str | None) -> Scan:
-    """The codes of a grey image, or of a colour image whose channels agree.
+    """Reads the codes of a grey image, or of a colour image whose channels are equal.
 
-    full_code is 255 or 65535, None for floating-point TIFFs. Raises InputError for what is no single
-    opaque grey page.
+    full_code is 255 or 65535, None for floating-point TIFFs. Raises InputError for anything but one opaque grey page.
     """
     pick_channel(path.name, [_CHANNEL], channel)
     with third_party(path.name, _EXPECTED, "Pillow"), _opened(path) as opened:
@@ -38,7 +37,7 @@ def read(path: Path, channel: str | None) -> Scan:
 
 
 def _opened(path: Path) -> Image.Image:
-    """The image with its header read. Pillow's own words would name folders and settings of its own."""
+    """Opens an image and reads its header. Pillow's messages would name folders and settings of the library."""
     try:
         return Image.open(path, formats=("PNG", "TIFF", "BMP"))
     except UnidentifiedImageError:
@@ -49,7 +48,7 @@ def _opened(path: Path) -> Image.Image:
 
 
 def _codes(path: Path, opened: Image.Image) -> tuple[NDArray[np.generic], float | None]:
-    """Pixels as stored, top row first, and the largest code."""
+    """Returns the pixels as stored, top row first, and the largest code."""
     check_shape(path.name, (opened.height, opened.width))
     pages = getattr(opened, "n_frames", 1)
     if pages != 1:
@@ -79,13 +78,13 @@ def _grey_of_colour(path: Path, rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _refuse_lossy(path: Path, opened: Image.Image) -> None:
-    """Refuses what Pillow would alter without a word."""
+    """Raises InputError for formats that Pillow converts silently."""
     if opened.format == "PNG" and _png_bits_and_colour(path) in ((16, 2), (16, 4), (16, 6)):
-        # Pillow keeps the high byte alone of 16-bit colour and grey-alpha PNGs
+        # Pillow keeps only the high byte of 16-bit PNGs with colour or alpha
         raise fault(path.name, "8-bit colour or 16-bit grey", "16-bit colour or alpha", _WAY_OUT)
     white_is_zero = _tiff_tag(opened, _PHOTOMETRIC) == _WHITE_IS_ZERO
     if opened.format == "TIFF" and white_is_zero and opened.mode not in ("1", "L"):
-        # Pillow turns these round for 8 bits only
+        # Pillow inverts only the 8-bit ones
         raise fault(path.name, "a TIFF in which black is zero", "one in which white is zero", _WAY_OUT)
 
 
@@ -95,7 +94,7 @@ def _tiff_tag(opened: Image.Image, tag: int) -> object:
 
 
 def _png_bits_and_colour(path: Path) -> tuple[int, int]:
-    """Bit depth and colour type, which stand at fixed places in a PNG's first chunk."""
+    """Reads bit depth and colour type, at fixed positions of a PNG's first chunk."""
     with path.open("rb") as file:
         header = file.read(26)
     return header[24], header[25]

@@ -1,4 +1,4 @@
-"""Nanonis .sxm, by nanonispy2."""
+"""Reads Nanonis' .sxm files, by nanonispy2."""
 
 import shutil
 from collections.abc import Iterator
@@ -24,9 +24,9 @@ _BACKWARD = " backward"
 
 
 def read(path: Path, channel: str | None) -> Scan:
-    """One channel in one direction: "Z" is the forward scan, "Z backward" the way back.
+    """Reads one channel in one direction: "Z" is the forward scan, "Z backward" the backward scan.
 
-    Lines that were never scanned are NaN in the file, and so holes.
+    Lines that were not scanned are NaN in the file, and become holes.
     """
     with third_party(path.name, "a Nanonis .sxm file", "nanonispy2"):
         from nanonispy2.read import Scan as NanonisScan
@@ -34,7 +34,7 @@ def read(path: Path, channel: str | None) -> Scan:
         with _named_sxm(path) as named:
             stored = NanonisScan(str(named))
         units = dict(zip(stored.header["data_info"]["Name"], stored.header["data_info"]["Unit"], strict=True))
-        names = [name + way for name, unit in units.items() if micrometres(unit) for way in ("", _BACKWARD)]
+        names = [name + suffix for name, unit in units.items() if micrometres(unit) for suffix in ("", _BACKWARD)]
         name = names[pick_channel(path.name, names, channel)]
         heights = _heights(path, stored, name)
         um_per_unit = micrometres(units[name.removesuffix(_BACKWARD)])
@@ -46,7 +46,7 @@ def read(path: Path, channel: str | None) -> Scan:
 
 @contextmanager
 def _named_sxm(path: Path) -> Iterator[Path]:
-    """The file under a name ending in .sxm, without which nanonispy2 does not look into it."""
+    """Yields the file under a name that ends in .sxm, which nanonispy2 requires."""
     if path.suffix == ".sxm":
         yield path
         return
@@ -57,17 +57,17 @@ def _named_sxm(path: Path) -> Iterator[Path]:
 
 
 def _heights(path: Path, stored: Any, name: str) -> NDArray[np.float64]:
-    """The channel with x to the right and y up; the file holds samples in the order of scanning."""
-    way = "backward" if name.endswith(_BACKWARD) else "forward"
-    lines = np.array(stored.signals[name.removesuffix(_BACKWARD)][way], dtype=np.float64)
+    """Turns a channel so that x grows to the right and y upwards; the file has samples in the order of scanning."""
+    direction = "backward" if name.endswith(_BACKWARD) else "forward"
+    lines = np.array(stored.signals[name.removesuffix(_BACKWARD)][direction], dtype=np.float64)
     check_shape(path.name, lines.shape)
-    if way == "backward":
-        # the way back begins at the right
+    if direction == "backward":
+        # backward scans begin at the right
         lines = lines[:, ::-1]
-    direction = stored.header["scan_dir"]
-    if direction not in ("up", "down"):
-        raise fault(path.name, "SCAN_DIR 'up' or 'down'", repr(direction), "export it again")
-    if direction == "down":
+    slow_direction = stored.header["scan_dir"]
+    if slow_direction not in ("up", "down"):
+        raise fault(path.name, "SCAN_DIR 'up' or 'down'", repr(slow_direction), "export it again")
+    if slow_direction == "down":
         # the first line scanned was the top one
         lines = lines[::-1]
     return np.ascontiguousarray(lines)

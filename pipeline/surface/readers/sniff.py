@@ -1,4 +1,4 @@
-"""Tells the format of a scan file by its content; a suffix only where the content leaves a doubt."""
+"""Recognises the format of a scan file by its content, and by its suffix where the content is ambiguous."""
 
 import codecs
 import struct
@@ -28,7 +28,7 @@ _MAGIC = (
     (b"\x05\x00", "ibw"),
     (b"\x00\x05", "ibw"),
 )
-# formats that are known, and known not to be a height map here: first bytes, name, way out
+# known formats that are refused: first bytes, name, remedy
 _REFUSED = (
     (b"\xff\xd8\xff", "a JPEG image, whose compression alters heights", "export PNG or TIFF"),
     (b"GIF8", "a GIF image", "export PNG or TIFF"),
@@ -48,9 +48,9 @@ _HEAD_BYTES = 4096
 
 
 def sniff(path: Path) -> str:
-    """The format key of a file: "image", "text", "npy", "npz", "gwyddion", "nanonis" or one of spm.FORMATS.
+    """Returns the key of a file's format: "image", "text", "npy", "npz", "gwyddion", "nanonis" or one of spm.FORMATS.
 
-    Raises InputError where the file cannot be opened, is empty, or is nothing that can be read.
+    Raises InputError where the file cannot be opened, is empty, or has a format that no reader knows.
     """
     head = _head(path)
     for magic, found, way_out in _REFUSED:
@@ -98,7 +98,7 @@ def _is_text(head: bytes) -> bool:
 
 
 def _tiff_kind(path: Path) -> str:
-    """Park and JPK keep heights in private tags; what shows as their image is a preview."""
+    """Distinguishes images from TIFFs of Park and JPK, which keep heights in private tags, and a preview as image."""
     tags = _tiff_tags(path)
     if _PARK_MAGIC_TAG in tags:
         return "ps"
@@ -106,7 +106,7 @@ def _tiff_kind(path: Path) -> str:
 
 
 def _tiff_tags(path: Path) -> frozenset[int]:
-    """Tags of the first page of a classic TIFF; none where the file is cut short."""
+    """Reads the tags of the first page of a classic TIFF; an empty set where the file is truncated."""
     with path.open("rb") as file:
         order = "<" if file.read(2) == b"II" else ">"
         try:

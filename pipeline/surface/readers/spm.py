@@ -1,4 +1,4 @@
-"""Formats of scanning probe microscopes that SurfaceTopography reads."""
+"""Reads the formats of scanning probe microscopes that SurfaceTopography supports."""
 
 import logging
 from math import isclose
@@ -29,12 +29,15 @@ FORMATS = {
     "ps": "Park Systems TIFF",
 }
 _LIBRARY = "SurfaceTopography"
-# beneath it, tifffile logs what it finds in damaged files; without any handler that would be printed
+# tifffile, which it uses, logs faults of damaged files, and logging prints to stderr where no handler is set
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
 def read(path: Path, key: str, channel: str | None) -> Scan:
-    """One height channel of a file in FORMATS[key]. Raises InputError where there is none, or damage."""
+    """Reads one height channel of a file in the format `key` of FORMATS.
+
+    Raises InputError where the file is damaged or has no such channel.
+    """
     with third_party(path.name, f"a {FORMATS[key]} file", _LIBRARY):
         from SurfaceTopography.IO import open_topography
 
@@ -50,10 +53,10 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
 
 
 def _height_unit(channel: Any) -> float | None:
-    """Micrometres per unit of a channel's heights and field; None for phases, voltages and profiles.
+    """Returns micrometres per unit of a channel's heights and lateral sizes; None for phases, voltages and profiles.
 
-    Where both are lengths the library converts them to one unit; where they are not, it gives a pair, or
-    a unit of the values apart.
+    The library converts heights and sizes to one unit where both are lengths; otherwise it gives a pair of units, or
+    a separate unit of the values.
     """
     one_unit = isinstance(channel.unit, str) and isinstance(channel.data_unit, str)
     if channel.dim != 2 or not one_unit or micrometres(channel.data_unit) is None:
@@ -62,18 +65,18 @@ def _height_unit(channel: Any) -> float | None:
 
 
 def _heights(stored: Any) -> NDArray[np.float64]:
-    """Heights (ny, nx) with y up, NaN for holes, of the library's x-first array.
+    """Converts the library's array, whose first axis is x, to heights (ny, nx) with y upwards and NaN for holes.
 
-    Its readers turn every format so that heights().T is the image with the top row first. Held against
-    the preview inside a Park file (heights().T), and against another program's reading of a Nanoscope
-    file, which stores the bottom line first (heights().T[::-1]).
+    The library turns every format so that heights().T is the image with the top row first. This was compared with the
+    preview inside a Park file (heights().T), and with another program's reading of a Nanoscope file, which stores the
+    bottom line first (heights().T[::-1]).
     """
     filled = np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan)
     return np.ascontiguousarray(filled.T[::-1])
 
 
 def _pitch(channel: Any, um_per_unit: float) -> tuple[float, float]:
-    """Field over number of samples along (x, y), um."""
+    """Computes the pitch along (x, y), um: size of the field over number of samples."""
     notes = channel.info.get("raw_metadata", {})
     px, py = (
         _field(size, n, notes.get(note)) * um_per_unit / n
@@ -85,12 +88,11 @@ def _pitch(channel: Any, um_per_unit: float) -> tuple[float, float]:
 
 
 def _field(size: float, n: int, scan_size: str | None) -> float:
-    """The field of n samples.
+    """Returns the size of the field of n samples, in the unit of `size`.
 
-    Asylum scales its Igor waves so that the last sample sits at the scan size, a pitch of
-    scan size / (n - 1), and the library takes n times that for the field. But samples are taken at an
-    even rate over the whole line: ScanSpeed over Sample Rate in the file's own note is
-    scan size / n. So the field is the scan size, and n samples wide.
+    Asylum scales its Igor waves so that the last sample lies at the scan size, a pitch of scan size / (n - 1), and
+    the library multiplies this pitch by n. But samples are taken at a constant rate over the whole line: ScanSpeed
+    over Sample Rate in the file's note is scan size / n. The field is therefore the scan size.
     """
     if scan_size is not None and isclose(size * (n - 1) / n, float(scan_size), rel_tol=1e-4):
         return float(scan_size)

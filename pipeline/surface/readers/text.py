@@ -1,4 +1,4 @@
-"""Text matrices: rows of numbers, first row at the top, with or without a header that states units."""
+"""Reads text files: rows of numbers, the first row at the top, with or without a header that states units."""
 
 import codecs
 import re
@@ -36,20 +36,21 @@ _NAME = ("channel", "name")
 
 @dataclass(frozen=True)
 class _Lines:
-    """A text file in two parts: `header` by lower-case key, `rows` of numbers as text."""
+    """The header of a text file, by key in lower case, and its rows of numbers as text."""
 
     header: dict[str, str]
     rows: list[str]
 
     def first(self, keys: tuple[str, ...]) -> str | None:
+        """Returns the value of the first of these keys that the header has."""
         return next((self.header[key] for key in keys if key in self.header), None)
 
 
 def read(path: Path, channel: str | None) -> Scan:
-    """A matrix, a flat list with the image's width in the header, or complete x y z triples.
+    """Reads a matrix, a flat list with the image's width and height in the header, or complete x y z triples.
 
-    Matrices and lists are flipped, as their first row is the top; triples say where they lie. Raises
-    InputError for anything but numbers, uneven rows, and a single column or row without a width.
+    Matrices and lists are flipped, because their first row is the top. Raises InputError for anything but numbers,
+    for rows of different lengths, and for a single column or row without a width.
     """
     lines = _split(path, _decode(path.read_bytes()))
     separator, rows = _separated(path, lines.rows)
@@ -99,13 +100,13 @@ def _split(path: Path, content: str) -> _Lines:
 
 
 def _separated(path: Path, rows: list[str]) -> tuple[str | None, list[str]]:
-    """What parts the numbers, and the rows with decimal points."""
+    """Returns the separator of the numbers (None: white space), and the rows with decimal points."""
     separator, decimal_comma = _separator(path, rows[0])
     return separator, [row.replace(",", ".") for row in rows] if decimal_comma else rows
 
 
 def _separator(path: Path, row: str) -> tuple[str | None, bool]:
-    """What parts the numbers of a row (None: white space), and whether a comma is the decimal point."""
+    """Returns the separator of a row's numbers (None: white space), and whether a comma is the decimal point."""
     if ";" in row:
         return ";", True
     if "\t" in row:
@@ -115,12 +116,12 @@ def _separator(path: Path, row: str) -> tuple[str | None, bool]:
     if re.search(r"\d,\d", row) and re.search(r"\d\s+[-+.\d]", row):
         # '1,5 2,5' is two numbers to some and three to others
         found = f"both in {one_line(row, 40)!r}"
-        raise fault(path.name, "numbers parted by commas or by blanks", found, "write decimal points")
+        raise fault(path.name, "numbers separated by commas or by blanks", found, "write decimal points")
     return ",", False
 
 
 def _matrix(path: Path, lines: _Lines, table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The table in the shape of the image, top row first."""
+    """Returns the numbers in the shape of the image, top row first."""
     columns, rows = _count(lines, _COLUMNS), _count(lines, _ROWS)
     if columns is None or rows is None:
         if 1 in table.shape:
@@ -154,7 +155,7 @@ def _value_unit(path: Path, lines: _Lines) -> float | None:
 
 
 def _pitch(path: Path, lines: _Lines, shape: tuple[int, ...]) -> tuple[float, float] | None:
-    """Field over number of samples along (x, y), um; None where the header does not state both."""
+    """Computes the pitch along (x, y), um, from the size of the field; None where the header does not state it."""
     width, height = _length(path, lines, _WIDTH), _length(path, lines, _HEIGHT)
     if width is None or height is None:
         return None
@@ -168,5 +169,5 @@ def _length(path: Path, lines: _Lines, keys: tuple[str, ...]) -> float | None:
         return None
     scale = micrometres(quantity[2])
     if scale is None:
-        raise fault(path.name, "a field in a unit of length", f"'{keys[0]}: {value}'", "mend the header")
+        raise fault(path.name, "a field in a unit of length", f"'{keys[0]}: {value}'", "correct the header")
     return float(quantity[1]) * scale

@@ -1,21 +1,22 @@
-"""Tables of x, y, z triples that fill a regular grid."""
+"""Reads tables of x, y, z triples on a regular grid."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import check_shape, fault
 
-# coordinates closer than this share of the field are one grid line, written with rounding errors
+# coordinates closer than this share of the field are one grid line, up to rounding errors
 _SAME = 1e-5
-# a regular grid's steps differ by no more than this share
+# largest difference between the steps of a regular grid, relative to their mean
 _EVEN = 0.01
 
 
 def heights(file: str, table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Heights (ny, nx), y up with the coordinate, NaN where a point is missing; `table` is (n, 3).
+    """Arranges triples on their grid. Such files do not state the unit of x and y, so that the pitch is unknown.
 
-    The unit of x and y is not stated in such files, so no pitch comes of them. Raises InputError where
-    the points do not lie on one regular grid.
+    file: its name, for messages. table: x, y, z, (n, 3).
+    Returns heights (ny, nx), y upwards, NaN where a point is missing.
+    Raises InputError where the points do not lie on one regular grid.
     """
     column, nx = _grid_lines(file, "x", table[:, 0])
     row, ny = _grid_lines(file, "y", table[:, 1])
@@ -30,7 +31,7 @@ def heights(file: str, table: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _grid_lines(file: str, axis: str, values: NDArray[np.float64]) -> tuple[NDArray[np.intp], int]:
-    """For each value the number of its grid line, from the smallest on, and how many lines there are."""
+    """Returns the index of each coordinate's grid line, ascending with the coordinate, and the number of lines."""
     if not np.isfinite(values).all():
         raise fault(file, f"finite {axis} coordinates", "NaN or infinity", "export it again")
     distinct = np.unique(values)

@@ -1,7 +1,7 @@
-"""Synthetic surfaces: from the numbers of a recipe to a height field, exactly periodic where it has a period.
+"""Synthetic surfaces: height fields from the parameters of a recipe, exactly periodic where the recipe has a period.
 
-`make` is the only entrance. The patch comes first (`patch.py`), then one closed form or one seeded
-construction a file: `gratings.py`, `disc.py`, `random.py`, `snakes.py`.
+`make` chooses the construction. `patch.py` lays out the samples; `gratings.py`, `disc.py`, `random.py` and
+`snakes.py` hold closed forms and seeded constructions.
 """
 
 from typing import assert_never
@@ -23,10 +23,13 @@ from pipeline.surface.recipes.parameters import (
 
 
 def make(recipe: Recipe) -> HeightField:
-    """The height field of one recipe: float64 um, y up, the same for the same recipe.
+    """Makes the height field of a recipe; equal recipes give equal heights.
 
-    Gratings, discs, random and snake surfaces repeat across the patch's seams without a step; a tilted
-    mirror cannot. Raises ConfigError where the pitch cannot carry the structure asked for.
+    All surfaces but the tilted mirror repeat across the seams of the patch without a step.
+
+    recipe: kind and parameters.
+    Returns heights (ny, nx), um, y upwards.
+    Raises ConfigError where the pitch is too coarse for the structure, or the patch too small.
     """
     match recipe:
         case Mirror() | TiltedMirror():

@@ -12,7 +12,7 @@ from pipeline.surface.recipes.patch import Axis, Patch, patch_of
 
 
 def mirror(recipe: Mirror | TiltedMirror) -> HeightField:
-    """h = x tan(tilt_x) + y tan(tilt_y), um: zero at the centre, rising along the axes for positive tilts."""
+    """Makes h = x tan(tilt_x) + y tan(tilt_y), um, which is 0 at the middle sample."""
     patch = patch_of(recipe)
     field = HeightField(np.zeros(patch.shape), patch.pitch_um)
     if isinstance(recipe, Mirror):
@@ -23,18 +23,18 @@ def mirror(recipe: Mirror | TiltedMirror) -> HeightField:
 
 
 def sinusoid(recipe: Sinusoid) -> HeightField:
-    """h = a cos(2 pi x / period), um, with a crest at x = 0."""
+    """Makes h = a cos(2 pi x / period), um."""
     patch, axis = _grating(recipe)
     return _extrude(recipe.amplitude_um * np.cos(2 * np.pi * axis.phase()), patch, recipe.axis)
 
 
 def rectangular(recipe: Rectangular) -> HeightField:
-    """`height_um` over the share `duty` of each period, else 0.
+    """Makes a profile of `height_um` over the share `duty` of each period, and 0 elsewhere.
 
-    A sample holds the mean height of its own pitch, so the mean is exactly duty * height; the raised part
-    begins where the middle sample's pitch does. Where duty * period is a whole number of samples there are
-    only the two heights; otherwise one sample a period lies between them, and exp(i k w h) is off the
-    closed form by at most 2 / (samples per period).
+    Each sample is the mean height over its pitch, so that the mean is exactly duty * height. The raised part begins
+    where the pitch of the middle sample begins. Where duty * period is a whole number of samples, only the two
+    heights occur; otherwise one sample per period lies between them, and exp(i k w h) differs from the closed form by
+    at most 2 / (samples per period).
     """
     patch, axis = _grating(recipe)
     begin = axis.phase()
@@ -47,24 +47,24 @@ def rectangular(recipe: Rectangular) -> HeightField:
 
 
 def blazed(recipe: Blazed) -> HeightField:
-    """A sawtooth rising along the axis from 0 to `height_um`, dropping once a period.
+    """Makes a sawtooth that rises along the axis from 0 to `height_um` and drops once per period.
 
-    Samples are heights at points, none averaged across the drop, so every sample lies on the ramp. They
-    stand half a phase step off the drop: the phases that occur are (m + 1/2) / M, the midpoint rule, which
-    makes the mean exactly height / 2 and leaves sums of exp(i k w h) exp(2 pi i m x / period) off the
-    continuous integral by O(1 / M^2) only; M is the number of samples a period where that is whole.
+    Samples are heights at points; an average across the drop would not lie on the ramp. The first phase is half a
+    phase step after the drop, so that the phases (m + 1/2) / M are those of the midpoint rule: the mean is exactly
+    height / 2, and sums of exp(i k w h) exp(2 pi i m x / period) differ from the integral by O(1 / M^2). M is the
+    number of samples per period where that is an integer.
     """
     patch, axis = _grating(recipe)
     return _extrude(recipe.height_um * (axis.phase() + 0.5 * axis.phase_step), patch, recipe.axis)
 
 
 def _grating(recipe: Sinusoid | Rectangular | Blazed) -> tuple[Patch, Axis]:
-    """The patch of a grating and its axis of variation."""
+    """Lays out the patch of a grating; returns it and the axis along which heights vary."""
     patch = patch_of(recipe)
     return patch, patch.x if recipe.axis == "x" else patch.y
 
 
 def _extrude(profile_um: NDArray[np.float64], patch: Patch, along: Literal["x", "y"]) -> HeightField:
-    """The profile along one axis, constant along the other."""
+    """Extends a profile, um, along the axis on which heights are constant."""
     profile = profile_um if along == "x" else profile_um[:, None]
     return HeightField(np.broadcast_to(profile, patch.shape).copy(), patch.pitch_um)

@@ -1,4 +1,4 @@
-"""The numbers of every synthetic surface, as a config gives them: one class a recipe."""
+"""The parameters of synthetic surfaces, as a config gives them: one class per recipe."""
 
 from typing import Annotated, Literal
 
@@ -10,19 +10,21 @@ Seed = Annotated[int, Field(ge=0)]
 
 
 class RecipeBase(Validated):
-    """What every synthetic surface has. `size_um` is rounded to a whole number of periods."""
+    """The parameters of all synthetic surfaces. `size_um` is rounded to a whole number of periods."""
 
     size_um: Positive | PositivePair = 65.0
-    # 1 / (2 pitch) covers 2 / 380 nm, the highest frequency that visible light reaches
+    # its Nyquist limit is above 2 / 380 nm, the highest frequency that visible light can reach
     pitch_um: Positive | PositivePair = 0.09
 
 
 class Mirror(RecipeBase):
+    """A plane at height 0."""
+
     kind: Literal["mirror"]
 
 
 class TiltedMirror(RecipeBase):
-    """A plane rising along x and y by the given angles."""
+    """A plane that rises along x and y by the given angles."""
 
     kind: Literal["tilted_mirror"]
     tilt_x_deg: Annotated[float, Field(gt=-80, lt=80)] = 2.0
@@ -39,7 +41,7 @@ class Sinusoid(RecipeBase):
 
 
 class Rectangular(RecipeBase):
-    """Height `height_um` over the share `duty` of each period, else 0."""
+    """Height `height_um` over the share `duty` of each period, 0 elsewhere."""
 
     kind: Literal["rectangular"]
     period_um: Positive = 2.5
@@ -49,7 +51,7 @@ class Rectangular(RecipeBase):
 
 
 class Blazed(RecipeBase):
-    """A sawtooth rising along the axis from 0 to `height_um` in each period."""
+    """A sawtooth that rises along the axis from 0 to `height_um` in each period."""
 
     kind: Literal["blazed"]
     period_um: Positive = 2.5
@@ -58,7 +60,7 @@ class Blazed(RecipeBase):
 
 
 class CompactDisc(RecipeBase):
-    """Tracks along x, `track_um` apart; pits and lands of 3 to 11 channel bits at random."""
+    """Tracks along x, `track_um` apart, with pits and lands of random lengths, 3 to 11 channel bits."""
 
     kind: Literal["cd"]
     track_um: Positive = 1.6
@@ -78,7 +80,7 @@ class GaussianRandom(RecipeBase):
 
 
 class Elaphe(RecipeBase):
-    """Overlapping fingers along y, `across_um` apart, without a firm period along their length."""
+    """Overlapping fingers along y, `across_um` apart, without a fixed period along their length."""
 
     kind: Literal["elaphe"]
     across_um: Positive = 1.144
@@ -87,7 +89,7 @@ class Elaphe(RecipeBase):
 
 
 class Xenopeltis(RecipeBase):
-    """Rows of fingers: `across_um` apart along x, `along_um` along y, the rows wandering."""
+    """Rows of fingers, `across_um` apart along x and `along_um` apart along y; the rows meander."""
 
     kind: Literal["xenopeltis"]
     across_um: Positive = 0.55

@@ -1,4 +1,4 @@
-"""The sampled patch a recipe asks for: a whole number of periods on a whole number of samples."""
+"""The layout of a recipe's samples: a whole number of periods on a whole number of samples."""
 
 from dataclasses import dataclass
 from math import gcd
@@ -23,9 +23,9 @@ from pipeline.surface.recipes.parameters import (
 )
 from pipeline.validated import as_pair
 
-# 8 GiB a field: past this a size or a pitch is in the wrong unit
+# 8 GiB per field: beyond this, a size or a pitch was given in a wrong unit
 _MOST_SAMPLES = 2**30
-# of a compact disc, in channel bits
+# run lengths of a compact disc, in channel bits
 SHORTEST_RUN = 3
 LONGEST_RUN = 11
 
@@ -34,7 +34,7 @@ LONGEST_RUN = 11
 class Axis:
     """One axis of a patch.
 
-    size_um: its length; samples: how many share it equally; periods: how many whole periods it holds.
+    size_um: length, um. samples: number of samples. periods: number of whole periods.
     """
 
     size_um: float
@@ -43,26 +43,26 @@ class Axis:
 
     @property
     def pitch_um(self) -> float:
-        """Sample distance, um: size / samples, near the pitch asked for."""
+        """Sample distance, um: size / samples, close to the requested pitch."""
         return self.size_um / self.samples
 
     def phase(self) -> NDArray[np.float64]:
-        """Position within the period, [0, 1), at every sample; 0 at the middle sample n // 2.
+        """Computes the position within the period, (samples,), in [0, 1), which is 0 at the middle sample n // 2.
 
-        Integers first: the division is the only rounding, so equal phases are equal numbers.
+        The division of integers is the only operation that rounds, so that equal phases are equal numbers.
         """
         turns = (np.arange(self.samples) - self.samples // 2) * self.periods % self.samples
         return turns / self.samples
 
     @property
     def phase_step(self) -> float:
-        """Distance between neighbours among all phases that occur: gcd(periods, samples) / samples."""
+        """Distance between neighbouring phases: gcd(periods, samples) / samples."""
         return gcd(self.periods, self.samples) / self.samples
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Both axes of a patch; arrays on it are (y.samples, x.samples)."""
+    """Both axes of a patch, whose arrays have the shape (y.samples, x.samples)."""
 
     x: Axis
     y: Axis
@@ -84,9 +84,9 @@ class Patch:
 
 
 def patch_of(recipe: Recipe) -> Patch:
-    """The patch a recipe asks for, as cheap as a look: nothing is made yet.
+    """Lays out the patch of a recipe, without making heights.
 
-    Raises ConfigError where the patch cannot carry the structure asked for.
+    Raises ConfigError where the pitch is too coarse for the structure, or the patch too small.
     """
     match recipe:
         case Sinusoid() | Rectangular() | Blazed():
@@ -107,7 +107,7 @@ def patch_of(recipe: Recipe) -> Patch:
 
 
 def _disc_patch(recipe: CompactDisc) -> Patch:
-    """Whole bits along x, at least one pit and one land, and whole tracks along y."""
+    """Lays out whole bits along x, for at least one pit and one land, and whole tracks along y."""
     if recipe.pit_width_um > recipe.track_um:
         text = f"expected at most track_um = {recipe.track_um:g} um, got {recipe.pit_width_um:g} um"
         raise refusal(recipe, "pit_width_um", text)
@@ -119,7 +119,7 @@ def _disc_patch(recipe: CompactDisc) -> Patch:
 
 
 def _gaussian_patch(recipe: GaussianRandom) -> Patch:
-    """Samples finer than half a correlation length, and a patch longer than one."""
+    """Lays out at least two samples per correlation length, and at least one correlation length per axis."""
     patch = _lay_out(recipe)
     for name, length, axis in zip("xy", as_pair(recipe.correlation_um), (patch.x, patch.y), strict=True):
         if not 2 * axis.pitch_um <= length <= axis.size_um:
@@ -129,10 +129,10 @@ def _gaussian_patch(recipe: GaussianRandom) -> Patch:
 
 
 def _lay_out(recipe: RecipeBase, period_x_um: float | None = None, period_y_um: float | None = None) -> Patch:
-    """The patch nearest to the recipe's `size_um` and `pitch_um` that holds whole periods (at least one).
+    """Lays out the patch with whole periods, at least one per axis, that is closest to `size_um` and `pitch_um`.
 
-    An axis without a period keeps its size. Raises ConfigError where a period falls below two samples,
-    which no height field can carry, or where the patch would not fit into memory.
+    An axis without a period keeps its size. Raises ConfigError where a period has less than two samples (the Nyquist
+    limit), or where the patch would not fit into memory.
     """
     sizes, pitches = as_pair(recipe.size_um), as_pair(recipe.pitch_um)
     axes = [
@@ -158,11 +158,11 @@ def _lay_out_axis(recipe: RecipeBase, name: str, size: float, pitch: float, peri
 
 
 def refusal(recipe: RecipeBase, key: str, text: str) -> ConfigError:
-    """The ConfigError for one key of a recipe."""
+    """Returns the ConfigError for one key of a recipe."""
     kind = getattr(recipe, "kind", "recipe")
     return ConfigError(f"recipe {kind}", [(f"surface.recipe.{key}", text)])
 
 
 def generator(seed: int) -> np.random.Generator:
-    """The random numbers of a seed; negative seeds are as good as others."""
+    """Returns the random numbers of a seed, which may be negative."""
     return np.random.default_rng(seed % 2**64)

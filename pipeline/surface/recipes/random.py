@@ -12,10 +12,10 @@ from pipeline.validated import as_pair
 
 
 def gaussian(recipe: GaussianRandom) -> HeightField:
-    """A Gaussian random surface, periodic, of mean 0 and standard deviation exactly `sigma_h_um`.
+    """Makes a periodic Gaussian random surface with mean 0 and a standard deviation of exactly `sigma_h_um`.
 
-    Its autocorrelation is sigma^2 exp(-x^2/lx^2 - y^2/ly^2) in the mean over seeds. Raises ConfigError where
-    the pitch is above half a correlation length or the patch is shorter than one.
+    The mean of its autocorrelation over seeds is sigma^2 exp(-x^2/lx^2 - y^2/ly^2). Raises ConfigError where the
+    pitch exceeds half a correlation length, or a correlation length the patch.
     """
     patch = patch_of(recipe)
     noise = smooth_noise(generator(recipe.seed), patch.y, patch.x, as_pair(recipe.correlation_um))
@@ -25,10 +25,13 @@ def gaussian(recipe: GaussianRandom) -> HeightField:
 def smooth_noise(
     rng: np.random.Generator, y: Axis, x: Axis, correlation_um: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Periodic Gaussian noise (ny, nx), mean 0, rms exactly 1, autocorrelation exp(-x^2/lx^2 - y^2/ly^2).
+    """Makes periodic Gaussian noise with mean 0, rms exactly 1 and autocorrelation exp(-x^2/lx^2 - y^2/ly^2).
 
-    White noise is filtered by the root of the power spectrum, exp(-pi^2 (lx^2 fx^2 + ly^2 fy^2) / 2).
-    Correlation lengths above half an axis are cut to it, so that a small patch still varies.
+    White noise is filtered by the root of the power spectrum, exp(-pi^2 (lx^2 fx^2 + ly^2 fy^2) / 2). Correlation
+    lengths are limited to half of the axis, so that small patches vary, too.
+
+    y, x: the axes. correlation_um: (lx, ly), um.
+    Returns (ny, nx).
     """
     lx, ly = (min(length, 0.5 * axis.size_um) for length, axis in zip(correlation_um, (x, y), strict=True))
     white = fourier.rfft2(rng.standard_normal((y.samples, x.samples)))
@@ -41,9 +44,12 @@ def smooth_noise(
 def lowpass(
     spectrum: NDArray[np.complex128], y: Axis, x: Axis, length_um: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """The real field (ny, nx) of a half spectrum `rfft2`, times exp(-pi^2 (lx^2 fx^2 + ly^2 fy^2)).
+    """Multiplies a spectrum by exp(-pi^2 (lx^2 fx^2 + ly^2 fy^2)) and transforms it back.
 
-    That is convolution with a Gaussian of standard deviation length / sqrt(2), periodic across the seams.
+    That is a periodic convolution with a Gaussian of standard deviation length / sqrt(2).
+
+    spectrum: rfft2 of a field, (ny, nx // 2 + 1). y, x: the axes. length_um: (lx, ly), um.
+    Returns (ny, nx).
     """
     fx = fft.rfftfreq(x.samples, x.pitch_um)
     fy = fft.fftfreq(y.samples, y.pitch_um)

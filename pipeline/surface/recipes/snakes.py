@@ -1,7 +1,7 @@
-"""Snake skins in the manner of [D14] figs. 1, 3 and 5: their periods and disorder, not their scans.
+"""Synthetic snake skins with the periods and the disorder of those in [D14], figs. 1, 3 and 5.
 
-Both are built from a smoothly distorted lattice of fingers. Distortions are periodic noise, so the field
-is exactly periodic; shapes were matched by eye and by power spectrum to AFM scans of 65 um.
+Both are smoothly distorted lattices of fingers. The distortions are periodic noise, so that the field is exactly
+periodic. The shapes were matched to AFM scans of 65 um by eye and by power spectrum.
 """
 
 import numpy as np
@@ -13,18 +13,18 @@ from pipeline.surface.recipes.parameters import Elaphe, Xenopeltis
 from pipeline.surface.recipes.patch import Axis, Patch, generator, patch_of
 from pipeline.surface.recipes.random import lowpass, smooth_noise
 
-# rms blur of the probe's finite tip, um; it also keeps the steps within the samples' band
+# rms blur by the finite tip of the probe, um, which also limits steps to frequencies below the Nyquist limit
 _TIP_UM = 0.04
 _ELAPHE_FINGER_UM = 2.95
-# what an AFM sees of the bare skin, beside waves of rms 1
+# rms of the skin's grain, relative to that of its waves
 _GRAIN = 0.12
 
 
 def elaphe(recipe: Elaphe) -> HeightField:
-    """Columns of tapered fingers, `across_um` apart along x, tips towards +y, overlapping like tiles.
+    """Makes columns of tapered fingers, `across_um` apart along x, which overlap like tiles with tips towards +y.
 
-    Whole periods along x. Columns place their fingers (about 2.95 um long) by phases that drift along and
-    across the skin, so that there is no firm period along y. Peak to valley is exactly `height_um`.
+    The patch holds whole periods along x. The phases of the fingers (about 2.95 um long) drift along and across the
+    skin, so that there is no fixed period along y. The peak-to-valley height is exactly `height_um`.
     """
     patch = patch_of(recipe)
     rng = generator(recipe.seed)
@@ -39,15 +39,16 @@ def elaphe(recipe: Elaphe) -> HeightField:
 
 
 def _lattice(axis: Axis) -> Array:
-    """Periods from the first sample on, [0, periods)."""
+    """Returns the position of each sample from the first one, in periods, (samples,), in [0, periods)."""
     return np.arange(axis.samples, dtype=np.float64) * (axis.periods / axis.samples)
 
 
 def _elaphe_finger(s: Array, along: Array) -> Array:
-    """Height of a finger: `s` columns off its ridge, `along` in fingers, whole at bases; ridge 1, floor 0.
+    """Computes the height of fingers, about 1 on ridges and 0 on the floor.
 
-    Half width falls from a flared base to a narrow tip. The floor sinks from tip to base into slits that
-    end at a web, which joins neighbouring bases and hangs lower between them.
+    s: distance from the ridge, in columns. along: position along the fingers, an integer at their bases.
+    The half width decreases from a flared base to a narrow tip. From tip to base, the floor sinks into slits that end
+    at a web, which joins neighbouring bases and is lower between them.
     """
     t = (along + 0.03 * np.cos(2 * np.pi * s)) % 1.0
     half_width = 0.14 + 0.23 * (1.0 - t) + 0.08 * np.exp(-t / 0.08)
@@ -58,10 +59,10 @@ def _elaphe_finger(s: Array, along: Array) -> Array:
 
 
 def xenopeltis(recipe: Xenopeltis) -> HeightField:
-    """Rows of short fingers, `across_um` apart along x and `along_um` along y; the rows bend as they run.
+    """Makes meandering rows of short fingers, `across_um` apart along x and `along_um` apart along y.
 
-    Whole periods along both axes. Each finger rises towards +y and drops at its tip, so that the profile
-    along y is a sawtooth. Peak to valley is exactly `height_um`.
+    The patch holds whole periods along both axes. Each finger rises towards +y and drops at its tip, so that the
+    profile along y is a sawtooth. The peak-to-valley height is exactly `height_um`.
     """
     patch = patch_of(recipe)
     rng = generator(recipe.seed)
@@ -81,9 +82,9 @@ def xenopeltis(recipe: Xenopeltis) -> HeightField:
 
 
 def _xenopeltis_finger(s: Array, t: Array) -> Array:
-    """Height of one finger: `s` fingers off its ridge, `t` from the row's foot (0) to the next row's (1).
+    """Computes the height of one finger: a smooth foot at 0, a rising ridge between slits, and a round tip near 1.
 
-    A smooth foot, then a rising ridge between slits, then a round tip; ridge up to 1, foot 0.
+    s: distance from the ridge, in fingers. t: position from the foot of the row (0) to that of the next row (1).
     """
     ridge = 1.0 - np.abs(2 * s) ** 3
     inside = t < 1.0 - 0.25 * (2 * s) ** 2
@@ -92,7 +93,7 @@ def _xenopeltis_finger(s: Array, t: Array) -> Array:
 
 
 def _unevenness(rng: np.random.Generator, patch: Patch, grain_um: tuple[float, float]) -> Array:
-    """Waves of the skin, rms 1, and grain of the given correlation length, (ny, nx)."""
+    """Makes long waves of rms 1 and grain of the correlation lengths `grain_um` (x, y), (ny, nx)."""
     long_waves = smooth_noise(rng, patch.y, patch.x, (16.0, 16.0))
     waves = smooth_noise(rng, patch.y, patch.x, (6.0, 6.0))
     grain = smooth_noise(rng, patch.y, patch.x, grain_um)
@@ -100,7 +101,7 @@ def _unevenness(rng: np.random.Generator, patch: Patch, grain_um: tuple[float, f
 
 
 def _finish(height: Array, patch: Patch, height_um: float) -> HeightField:
-    """Blurred by the tip, scaled to the peak-to-valley height asked for, um."""
+    """Blurs heights by the probe's tip and scales them to the peak-to-valley height `height_um`."""
     tip = [np.sqrt(2) * max(_TIP_UM, 0.4 * pitch) for pitch in patch.pitch_um]
     height = lowpass(fourier.rfft2(height), patch.y, patch.x, (tip[0], tip[1]))
     low = float(height.min())

@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Scene
 from pipeline.tables.planning.anisotropy import probing_angles

@@ -10,7 +10,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, xyz_direct
 from pipeline.evaluation.figures.laser_screen import LIGHT, Screen, bands_of, experiment
 from pipeline.optics import geometry
-from pipeline.optics.fresnel import read_columns
+from pipeline.optics.csv_columns import shipped
 from pipeline.optics.light import illuminant_at, trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.source import SurfaceSource
@@ -93,14 +93,14 @@ def test_a_gold_mirror_shows_the_laser_in_its_spot_alone() -> None:
 
 
 def test_the_laser_is_dark_below_its_onset_and_rises_above() -> None:
-    path = str(files("pipeline.optics").joinpath("supercontinuum.csv"))
+    path = str(files("pipeline.optics").joinpath("data", "supercontinuum.csv"))
     nm = np.arange(380.0, 781.0)
     power = illuminant_at(path, nm)
     assert np.all(power[nm <= 435] == 0.0)
     assert power[nm == 450] == pytest.approx(0.5 * 0.55, rel=0.05)
     assert np.all(np.diff(power) >= 0.0)
     assert power[-1] == 1.0
-    table = read_columns(files("pipeline.optics").joinpath("supercontinuum.csv").read_bytes(), 2, "laser")
+    table = shipped("supercontinuum.csv", 2)
     assert (table[0, 0], table[-1, 0]) == (380.0, 780.0)
     assert trapezoid(experiment(config()).light, 1.0).weights[:, 1].sum() == pytest.approx(1.0)
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.accuracy import scalar_domain as domain
 from pipeline.config.models import Config
 from pipeline.evaluation.figures import coupled_wave, scalar_errors, validity
 from pipeline.evaluation.figures.coupled_wave import Grating, Resolution
 from pipeline.evaluation.figures.figure import Bench, Surface
 from pipeline.evaluation.figures.scalar_errors import Case
 from pipeline.optics import fresnel
-from pipeline.optics import validity as domain
 from pipeline.progress import silent
 from pipeline.surface import recipes
-from pipeline.surface.statistics import Period
+from pipeline.surface.periods import Period
 
 pytestmark = pytest.mark.physics
 

@@ -9,7 +9,7 @@ from pipeline.errors import ConfigError
 from pipeline.evaluation.methods.gems import Gems
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import displayed_srgb
+from pipeline.optics.colour import displayed_srgb
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make

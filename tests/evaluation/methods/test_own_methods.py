@@ -12,7 +12,7 @@ from pipeline.evaluation.methods.method import Method, Monochromatic, prepare
 from pipeline.evaluation.methods.polar_table import PolarTableMethod
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField

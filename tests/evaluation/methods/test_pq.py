@@ -9,7 +9,7 @@ from pipeline.evaluation.methods.flss import Flss
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.evaluation.methods.pq import Pq
 from pipeline.optics import geometry
-from pipeline.optics.colour_error import delta_e
+from pipeline.optics.colour import delta_e
 from pipeline.surface.heightfield import HeightField
 from tests.evaluation.methods.surfaces import ELAPHE, config, made
 

@@ -7,12 +7,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pipeline.optics.colour_error import EXPOSURES_RU, colour_errors, delta_e, displayed_srgb, pixels
+from pipeline.optics.colour import (
+    EXPOSURES_RU,
+    SRGB_FROM_XYZ,
+    SRGB_TO_XYZ,
+    WHITE_XYZ,
+    colour_errors,
+    delta_e,
+    displayed_srgb,
+    pixels,
+)
 
 D65_XY = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
 WHITE = colour.xy_to_XYZ(D65_XY)
 colours = arrays(np.float64, (4, 3), elements=st.floats(0.0, 1.5))
 exposures = st.floats(0.1, 1e4)
+
+
+def test_srgb_is_the_librarys():
+    space = colour.RGB_COLOURSPACES["sRGB"]
+    np.testing.assert_array_equal(SRGB_TO_XYZ, space.matrix_RGB_to_XYZ)
+    np.testing.assert_array_equal(SRGB_FROM_XYZ, space.matrix_XYZ_to_RGB)
+    np.testing.assert_allclose(WHITE_XYZ, colour.xy_to_XYZ(space.whitepoint), rtol=1e-15)
 
 
 @given(a=colours, b=colours, exposure=exposures)

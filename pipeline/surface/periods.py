@@ -1,0 +1,252 @@
+"""The strongest periods of a height field: the lobes of its power spectrum, found by mean shift."""
+
+from dataclasses import dataclass
+from math import atan2, degrees, log, pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage
+
+from pipeline.arrays import Array
+from pipeline.fourier import backend as fourier
+from pipeline.surface.heightfield import HeightField
+
+# fewer repeats across the patch cannot be distinguished from waviness
+_FEWEST_REPEATS = 4.0
+# width of the smoothing kernel and radius of a lobe, as shares of the lobe's frequency; and their least values in
+# bins, because the window spreads even a single line over some bins
+_KERNEL, _KERNEL_BINS = 1 / 6, 1.0
+_RADIUS, _RADIUS_BINS = 1 / 6, 3.0
+# least power per bin, relative to the mean on the ring of the same |f|; isotropic noise remains below
+_LEAST_CONTRAST = 5.0
+# least share of the variance
+_LEAST_SHARE = 0.005
+
+
+@dataclass(frozen=True)
+class Period:
+    """One line or lobe of the height's power spectrum, at a frequency f.
+
+    period_um: 1 / |f|, um. direction_deg: azimuth of f from +x, degrees, in (-90, 90].
+    share: share of the heights' variance in the lobe.
+    """
+
+    period_um: float
+    direction_deg: float
+    share: float
+
+
+@dataclass(frozen=True)
+class _HeightSpectrum:
+    """The power spectrum of a windowed height field.
+
+    power: variance per bin (my, mx). fx (mx,), fy (my,): frequencies, 1/um, ascending through 0.
+    bin_per_um: distance of the frequencies along (x, y), 1/um. variance: sum of the power over all frequencies.
+    """
+
+    power: Array
+    fx: Array
+    fy: Array
+    bin_per_um: tuple[float, float]
+    variance: float
+
+
+def dominant_periods(field: HeightField, highest_per_um: float, count: int = 4) -> tuple[Period, ...]:
+    """Finds the strongest lobes of the height's power spectrum.
+
+    A lobe is a mode of the spectrum smoothed over a sixth of its frequency, so that the speckles into which disorder
+    splits a line count as one lobe. Its centre is a fixed point of mean shift, which locates a single line to a small
+    fraction of a bin. Lobes with fewer than four repeats across the patch, with less than 0.5 % of the variance, or
+    hardly brighter than other azimuths of the same |f| are omitted.
+
+    field: without holes. highest_per_um: the highest frequency of interest, 1/um. count: the most periods to return.
+    Returns the periods by falling share of the variance.
+    """
+    spectrum = _spectrum(field, highest_per_um)
+    if spectrum.variance == 0:
+        return ()
+    middles: list[complex] = []
+    found: list[Period] = []
+    for start in _candidates(spectrum, highest_per_um):
+        middle = _middle(spectrum, start)
+        if _repeats(spectrum, middle) < 0.95 * _FEWEST_REPEATS or _is_known(spectrum, middle, middles):
+            continue
+        share = _share(spectrum, middle)
+        if share >= _LEAST_SHARE:
+            middles.append(middle)
+            found.append(_period(middle, share))
+        if len(found) == count:
+            break
+    return tuple(sorted(found, key=lambda period: -period.share))
+
+
+def _repeats(spectrum: _HeightSpectrum, frequency: complex) -> float:
+    """Computes how often a frequency repeats across the patch."""
+    return abs(complex(frequency.real / spectrum.bin_per_um[0], frequency.imag / spectrum.bin_per_um[1]))
+
+
+def _is_known(spectrum: _HeightSpectrum, middle: complex, others: list[complex]) -> bool:
+    """Whether the lobe, or its mirror image at -f, overlaps one of the others."""
+    rx, ry = _extent(spectrum, middle, _RADIUS, _RADIUS_BINS)
+    for other in others:
+        qx, qy = _extent(spectrum, other, _RADIUS, _RADIUS_BINS)
+        for gap in (middle - other, middle + other):
+            if abs(complex(gap.real / (rx + qx), gap.imag / (ry + qy))) < 1:
+                return True
+    return False
+
+
+def _extent(spectrum: _HeightSpectrum, frequency: complex, share: float, bins: float) -> tuple[float, float]:
+    """Computes a share of |f|, but at least `bins` bins, along (x, y), 1/um."""
+    bin_x, bin_y = spectrum.bin_per_um
+    return max(share * abs(frequency), bins * bin_x), max(share * abs(frequency), bins * bin_y)
+
+
+def _period(frequency: complex, share: float) -> Period:
+    """Converts the frequency of a lobe, fx + i fy in 1/um, to a period."""
+    direction = degrees(atan2(frequency.imag, frequency.real))
+    if not -90 < direction <= 90:
+        direction += 180 if direction <= -90 else -180
+    return Period(1 / abs(frequency), direction, share)
+
+
+def _spectrum(field: HeightField, highest_per_um: float) -> _HeightSpectrum:
+    """Computes the power spectrum of a field for |fx|, |fy| <= `highest_per_um`, under a Gaussian window.
+
+    The window's sigma is an eighth of the patch. It has no side lobes that could be mistaken for lines.
+    """
+    ny, nx = field.shape
+    window = _window(ny)[:, None] * _window(nx)
+    seen = (field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))) * window
+    weight = float(np.sum(window**2))
+    # by Parseval's theorem, the sum over all frequencies; the rounding errors of a flat field count as 0
+    peak, variance = float(np.max(np.abs(field.heights_um))), float(np.vdot(seen, seen)) / weight
+    variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
+    x, fx = _ascending(nx, field.pitch_um[0], highest_per_um)
+    y, fy = _ascending(ny, field.pitch_um[1], highest_per_um)
+    # rfft2 returns half of the spectrum; the other half equals it at opposite frequencies
+    opposite = x > nx // 2
+    rows, columns = np.where(opposite, -y[:, None], y[:, None]) % ny, np.where(opposite, nx - x, x)
+    power = np.abs(fourier.rfft2(seen)[rows, columns]) ** 2 / (seen.size * weight)
+    size_x, size_y = field.size_um
+    return _HeightSpectrum(power, fx, fy, (1 / size_x, 1 / size_y), variance)
+
+
+def _ascending(samples: int, pitch_um: float, highest_per_um: float) -> tuple[np.ndarray, Array]:
+    """Returns the indices of a transform and their frequencies, 1/um, ascending from -highest to highest."""
+    place, frequency = fft.fftshift(np.arange(samples)), fft.fftshift(fft.fftfreq(samples, pitch_um))
+    kept = np.abs(frequency) <= highest_per_um
+    return place[kept], frequency[kept]
+
+
+def _window(samples: int) -> Array:
+    """Returns a centred Gaussian window (samples,) whose standard deviation is an eighth of its length."""
+    window: Array = np.exp(-0.5 * ((np.arange(samples) - 0.5 * (samples - 1)) / (samples / 8)) ** 2)
+    return window
+
+
+def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[complex]:
+    """Finds local maxima of the smoothed spectrum in one half plane, as fx + i fy, by falling power of their lobes.
+
+    Each octave of |f| is smoothed by a kernel of its own width. Octaves overlap, so that no maximum lies between two.
+    """
+    fx, fy = spectrum.fx, spectrum.fy[:, None]
+    radius = np.hypot(fx, fy)
+    repeats = np.hypot(fx / spectrum.bin_per_um[0], fy / spectrum.bin_per_um[1])
+    allowed = (repeats >= _FEWEST_REPEATS) & (radius <= highest_per_um) & ((fx > 0) | ((fx == 0) & (fy > 0)))
+    bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
+    lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
+    candidates: list[tuple[float, complex]] = []
+    # padded with zeros to sizes with fast transforms
+    my, mx = (fft.next_fast_len(n, real=True) for n in spectrum.power.shape)
+    transform = fourier.rfft2(spectrum.power, (my, mx))
+    while lowest < float(radius.max()):
+        width_x, width_y = _extent(spectrum, complex(1.4 * lowest), _KERNEL, _KERNEL_BINS)
+        density = _smooth(spectrum, transform, (my, mx), width_x, width_y)
+        peaks = allowed & (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
+        peaks &= density == ndimage.maximum_filter(density, 3)
+        # all power of a lobe narrower than the kernel, and a part of a wider one's: hence the lower threshold
+        power = density * (2 * 2 * pi * width_x * width_y / bin_area)
+        peaks &= power > 0.25 * _LEAST_SHARE * spectrum.variance
+        candidates += [(float(power[j, i]), complex(fx[i], fy[j, 0])) for j, i in np.argwhere(peaks)]
+        lowest *= 2
+    candidates.sort(key=lambda entry: -entry[0])
+    return [frequency for _, frequency in candidates]
+
+
+def _smooth(
+    spectrum: _HeightSpectrum,
+    transform: NDArray[np.complex128],
+    padded: tuple[int, int],
+    width_x: float,
+    width_y: float,
+) -> Array:
+    """Convolves the power with a Gaussian of standard deviations `width_x`, `width_y`, 1/um.
+
+    transform: rfft2 of the power, padded with zeros to the shape `padded` (my, mx).
+    """
+    my, mx = padded
+    gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
+    gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * fft.fftfreq(my)) ** 2)
+    rows, columns = spectrum.power.shape
+    return fourier.irfft2(transform * gain_y[:, None] * gain_x, padded)[:rows, :columns]
+
+
+def _near(
+    spectrum: _HeightSpectrum, middle: complex, reach_x: float, reach_y: float
+) -> tuple[NDArray[np.complex128], Array]:
+    """Returns the frequencies fx + i fy within a rectangle about `middle`, and their power, both (n,).
+
+    reach_x, reach_y: half sides of the rectangle, 1/um.
+    """
+    in_x = np.abs(spectrum.fx - middle.real) <= reach_x
+    in_y = np.abs(spectrum.fy - middle.imag) <= reach_y
+    frequencies = spectrum.fx[in_x] + 1j * spectrum.fy[in_y][:, None]
+    return frequencies.ravel(), spectrum.power[np.ix_(in_y, in_x)].ravel()
+
+
+def _middle(spectrum: _HeightSpectrum, start: complex) -> complex:
+    """Locates the centre of the lobe near `start`.
+
+    Where a single line holds half of the lobe's power, this is the line's frequency: neighbours then do not shift it.
+    """
+    middle = _mean_shift(spectrum, start, _extent(spectrum, start, _KERNEL, _KERNEL_BINS), reach=2.5)
+    line_width = _extent(spectrum, start, 0.0, _KERNEL_BINS)
+    frequencies, power = _near(spectrum, middle, *_extent(spectrum, middle, _RADIUS, _RADIUS_BINS))
+    line = _mean_shift(spectrum, complex(frequencies[np.argmax(power)]), line_width, reach=4.0)
+    line_extent = _extent(spectrum, line, 0.0, _RADIUS_BINS)
+    is_line = np.sum(_near(spectrum, line, *line_extent)[1]) > 0.5 * np.sum(power)
+    return line if is_line else middle
+
+
+def _mean_shift(spectrum: _HeightSpectrum, start: complex, width: tuple[float, float], reach: float) -> complex:
+    """Locates the mode near `start` of the spectrum smoothed by a Gaussian of standard deviations `width`, 1/um.
+
+    The mode is the fixed point of the kernel-weighted mean of frequencies. Only frequencies within `reach` widths of
+    `start` count, because a stronger neighbour, such as a harmonic, would attract the mean.
+    """
+    frequencies, power = _near(spectrum, start, reach * width[0], reach * width[1])
+    middle = start
+    for _ in range(200):
+        gap = frequencies - middle
+        weights = power * np.exp(-0.5 * ((gap.real / width[0]) ** 2 + (gap.imag / width[1]) ** 2))
+        shifted = complex(np.sum(weights * frequencies) / np.sum(weights))
+        step, middle = abs(shifted - middle), shifted
+        if step < 1e-7 * abs(start):
+            break
+    return middle
+
+
+def _share(spectrum: _HeightSpectrum, middle: complex) -> float:
+    """Computes the share of the variance in the lobes at +-f; 0 for a lobe without contrast to other azimuths."""
+    rx, ry = _extent(spectrum, middle, _RADIUS, _RADIUS_BINS)
+    frequencies, power = _near(spectrum, middle, rx, ry)
+    gap = frequencies - middle
+    inside = (gap.real / rx) ** 2 + (gap.imag / ry) ** 2 <= 1
+    lobe = float(np.sum(power[inside]))
+    distance = np.hypot(spectrum.fx, spectrum.fy[:, None])
+    ring = spectrum.power[np.abs(distance - abs(middle)) <= min(rx, ry)]
+    # lobes hardly change the median of the ring; that of speckle, whose power is exponential, is log 2 of the mean
+    noise = float(np.median(ring)) / log(2)
+    is_lobe = lobe > _LEAST_CONTRAST * noise * np.count_nonzero(inside)
+    return 2 * lobe / spectrum.variance if is_lobe else 0.0
