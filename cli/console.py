@@ -111,7 +111,7 @@ def step_reporter(config: Any, store: Any) -> Callable[[Any, float | None], None
     report_warnings = warning_reporter(config, store)
 
     def on_step(step: Any, seconds: float | None) -> None:
-        note(f"  {step.stage.name:<9} " + ("cached" if seconds is None else f"{seconds:.1f} s"))
+        note(f"  {step.stage.name:<14} " + ("cached" if seconds is None else f"{seconds:.1f} s"))
         report_warnings(step, seconds)
 
     return on_step
