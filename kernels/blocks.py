@@ -8,26 +8,21 @@ set serves both. `diffract-bake bench` times every constant beside another value
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# dft_stack: STEP_X and STEP_Y of the first step's k1, with sums of two and of four vectors, and KEPT frequencies of
-# the second step, with two. polar_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose window's loop
-# along x is written out. spectral_operator: W_BLOCK nodes of w with two vectors, and
-# SHARE_BLOCK nodes of w with six.
+# dft_stack: STEP of the first step's k1, with sums of two vectors, and KEPT frequencies of the second step, with two.
+# polar_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose window's loop along x is written out.
+# spectral_operator: W_BLOCK nodes of w with two vectors.
 _CHOSEN = {
-    "STEP_X": 2,
-    "STEP_Y": 1,
+    "STEP": 2,
     "KEPT": 2,
     "USUAL_TAPS": 7,
     "W_BLOCK": 2,
-    "SHARE_BLOCK": 1,
 }
 # what fills 32 registers; and no window of its own
 OTHERS = {
-    "STEP_X": 10,
-    "STEP_Y": 5,
+    "STEP": 10,
     "KEPT": 10,
     "USUAL_TAPS": 0,
     "W_BLOCK": 4,
-    "SHARE_BLOCK": 4,
 }
 _instead: dict[str, int] = {}
 

@@ -44,9 +44,9 @@ def transform(
     ny, nx = heights_um.shape
     lanes, terms = _VECTOR_BYTES // out.dtype.itemsize, out.shape[3]
     columns, rows = max(kept.phi_max, kept.reach) + 1, kept.shape[0]
-    sizes = blocks.chosen("STEP_X", "STEP_Y", "KEPT")
-    x = _axis(nx, np.arange(columns), sizes["STEP_X"], sizes["KEPT"], out.dtype)
-    y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), sizes["STEP_Y"], sizes["KEPT"], out.dtype)
+    sizes = blocks.chosen("STEP", "KEPT")
+    x = _axis(nx, np.arange(columns), sizes["STEP"], sizes["KEPT"], out.dtype)
+    y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), 1, sizes["KEPT"], out.dtype)
     program = programs.polar() if out.dtype == np.float32 else programs.exact()
     items, room = _ITEMS_A_UNIT * device.default_device().compute_units, max(3 * nx, 2 * ny)
     scratch = device.result_buffer(_VECTOR_BYTES * items * room), np.int64(room)

@@ -21,7 +21,7 @@ def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Pr
     """
     constants = {
         **_stack("float", 16),
-        **blocks.chosen("USUAL_TAPS", "W_BLOCK", "SHARE_BLOCK"),
+        **blocks.chosen("USUAL_TAPS", "W_BLOCK"),
         "MOST_BLOCKS": device.bound(term_blocks, _MOST_BLOCKS),
         "MOST_S_NODES": device.bound(s_nodes, _MOST_S_NODES),
         "MOST_W_TERMS": device.bound(w_terms, _MOST_W_TERMS),
@@ -40,6 +40,4 @@ def exact() -> device.Program:
 
 def _stack(real: str, lanes: int) -> dict[str, int | str]:
     """Constants of dft_stack.cl, whose vectors of `lanes` numbers have 64 bytes."""
-    sizes = blocks.chosen("STEP_X", "STEP_Y", "KEPT")
-    most_step = max(sizes["STEP_X"], sizes["STEP_Y"])
-    return {"REAL": real, "LANES": lanes, "MOST_PAIRS": MOST_PAIRS, "MOST_STEP": most_step, **sizes}
+    return {"REAL": real, "LANES": lanes, "MOST_PAIRS": MOST_PAIRS, **blocks.chosen("STEP", "KEPT")}

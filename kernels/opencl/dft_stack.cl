@@ -11,12 +11,12 @@
  * The first pairs n1 with N1 - n1: cosines meet their sum, sines their difference, and k1 serves N1 - k1 too, so
  * N1 / 2 + 1 of either are left. Tables of an axis:
  *
- *   cosine, sine   REAL[pairs][padded]           of 2 pi n1 k1 / N1; k1 padded to whole blocks of STEP
+ *   cosine, sine   REAL[pairs][padded]           of 2 pi n1 k1 / N1; k1 padded to whole blocks of STEP along x
  *   turn           REAL[blocks][N2][KEPT][2]     cosine and sine of 2 pi n2 k / N, KEPT frequencies of one k1 a block
  *   first_of       int[blocks]                   a block's k1
  *   place          int[blocks][KEPT]             where F[k] goes: its column or row; -1 for nothing
  *
- * Set by the host: REAL and its vectors of LANES; STEP_X and STEP_Y, at most MOST_STEP; KEPT;
+ * Set by the host: REAL and its vectors of LANES; STEP, the k1 of real samples that are summed at a time; KEPT;
  * MOST_PAIRS, which bounds pairs. Work-items take rows or columns get_global_size(0) apart, each with `room` vectors of scratch of its own: they
  * outgrow the stacks of a driver's threads.
  */
@@ -24,6 +24,8 @@
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
 #define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
+/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
+#define APART __attribute__((noinline))
 #define INLINE __attribute__((always_inline))
 #define JOIN(a, b) a##b
 #define NAME(a, b) JOIN(a, b)
@@ -49,7 +51,7 @@ static void chebyshev(const double8 t, const int first, double8 *term, double8 *
 }
 
 /* terms first .. first + LANES - 1 of eight samples t, a vector each */
-static void terms_of(const double8 t, const int first, __global REAL *out) {
+static APART void terms_of(const double8 t, const int first, __global REAL *out) {
     double8 before, term;
     chebyshev(t, first, &term, &before);
     ROLLED for (int n = 0; n < LANES; ++n) {
@@ -78,7 +80,7 @@ static INLINE void pair(__global const VECTOR *sample, const long stride, const 
 static INLINE void sums_over_n1(const VECTOR *sum, const VECTOR *difference, __global const REAL *cosine,
                                 __global const REAL *sine, const Axis axis, const int parts, const int step, VECTOR *c,
                                 VECTOR *s) {
-    VECTOR even[2 * MOST_STEP], odd[2 * MOST_STEP];
+    VECTOR even[2 * STEP], odd[2 * STEP];
     UNROLL for (int j = 0; j < parts * step; ++j) even[j] = odd[j] = 0;
     ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1)
         UNROLL for (int j = 0; j < step; ++j) {
@@ -115,15 +117,26 @@ static INLINE void first_step(__global const VECTOR *sample, __global const REAL
         VECTOR sum[2 * MOST_PAIRS], difference[2 * MOST_PAIRS];
         pair(sample + parts * n2, parts * axis.n2, axis, parts, sum, difference);
         ROLLED for (int k = 0; k < axis.pairs; k += step) {
-            VECTOR c[2 * MOST_STEP], s[2 * MOST_STEP];
+            VECTOR c[2 * STEP], s[2 * STEP];
             sums_over_n1(sum, difference, cosine + k, sine + k, axis, parts, step, c, s);
             ROLLED for (int j = 0; j < step; ++j) store_pair(c + parts * j, s + parts * j, k + j, n2, axis, parts, a);
         }
     }
 }
 
+static APART void first_step_of_real(__global const VECTOR *sample, __global const REAL *cosine,
+                                     __global const REAL *sine, const Axis axis, __global VECTOR *a) {
+    first_step(sample, cosine, sine, axis, 1, STEP, a);
+}
+
+/* Complex samples take one k1 at a time: their sums are as many vectors as those of two k1 of real ones. */
+static APART void first_step_of_complex(__global const VECTOR *sample, __global const REAL *cosine,
+                                        __global const REAL *sine, const Axis axis, __global VECTOR *a) {
+    first_step(sample, cosine, sine, axis, 2, 1, a);
+}
+
 /* The second step: F of the KEPT frequencies of a block, from the n2 values A of its k1: f[frequency][re, im]. */
-static void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[2]) {
+static APART void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[2]) {
     VECTOR re[KEPT], im[KEPT];
     UNROLL for (int q = 0; q < KEPT; ++q) re[q] = im[q] = 0;
     ROLLED for (int n2 = 0; n2 < n2s; ++n2) {
@@ -163,7 +176,7 @@ __kernel void along_x(__global const double *heights, const double scale, const 
                 terms_of(scale * t, first, (__global REAL *)(sample + to + x));
             }
         }
-        first_step(sample, cosine, sine, axis, 1, STEP_X, a);
+        first_step_of_real(sample, cosine, sine, axis, a);
         ROLLED for (int b = 0; b < axis.blocks; ++b) {
             VECTOR f[KEPT][2];
             second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
@@ -178,7 +191,7 @@ __kernel void along_x(__global const double *heights, const double scale, const 
 }
 
 /* the first `lit` lanes of a coefficient's real and imaginary parts, `terms` apart */
-static void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
+static APART void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
     ROLLED for (int n = 0; n < lit; ++n) {
         to[n] = ((const REAL *)&re)[n];
         to[terms + n] = ((const REAL *)&im)[n];
@@ -198,7 +211,7 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *cosine
     const int lit = min(LANES, terms - first);
 
     ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
-        first_step(narrow + 2L * phi * axis.n, cosine, sine, axis, 2, STEP_Y, a);
+        first_step_of_complex(narrow + 2L * phi * axis.n, cosine, sine, axis, a);
         ROLLED for (int b = 0; b < axis.blocks; ++b) {
             VECTOR f[KEPT][2];
             second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);

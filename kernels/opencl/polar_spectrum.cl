@@ -25,6 +25,8 @@
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
 #define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
+/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
+#define APART __attribute__((noinline))
 #define INLINE __attribute__((always_inline))
 
 /* E is larger than caches: lines written past them need not be read first */
@@ -81,7 +83,7 @@ static INLINE void gather(__global const float *corner, const int columns, const
 }
 
 /* rows and columns of sixteen vectors change places: halves, quarters, pairs and single lanes in turn */
-static void transpose(float16 *m) {
+static APART void transpose(float16 *m) {
     ROLLED for (int i = 0; i < 8; ++i) {
         const float16 a = m[i], b = m[i + 8];
         m[i] = (float16)(a.lo, b.lo);
@@ -117,7 +119,7 @@ typedef struct {
 /* rint below 2^51, which PoCL works out in twenty operations: 1.5 * 2^52 leaves no digits for what follows the point */
 static double16 nearest(const double16 x) { return (x + 6755399441055744.0) - 6755399441055744.0; }
 
-static void place_window(const Grid grid, __global const float *decay, __global const double *azimuth, const double radius,
+static APART void place_window(const Grid grid, __global const float *decay, __global const double *azimuth, const double radius,
                          const double fx_max, const double fy_max, const int reach_x, const int reach_y, Window *window) {
     const double16 turn = select((double16)1.0, (double16)-1.0, radius * vload16(0, azimuth) < 0.0);
     const int origin[2] = {grid.column_zero, grid.row_zero}, reach[2] = {reach_x, reach_y};
@@ -134,7 +136,7 @@ static void place_window(const Grid grid, __global const float *decay, __global 
 }
 
 /* F_n at one azimuth of a window, zero beyond the scan's band: [2][blocks][16 azimuths] */
-static void gather_azimuth(__global const float *stack, const int columns, const int blocks, const int taps_x,
+static APART void gather_azimuth(__global const float *stack, const int columns, const int blocks, const int taps_x,
                            const int taps_y, const Window *window, const int lane, float16 *f_n) {
     if (!((const int *)&window->known)[lane]) {
         ROLLED for (int b = 0; b < 2 * blocks; ++b) f_n[16 * b + lane] = 0.0f;
@@ -153,7 +155,7 @@ static void gather_azimuth(__global const float *stack, const int columns, const
 }
 
 /* E at one node in s from F_n, [terms], azimuths side by side; `opposite` takes those of the opposite azimuths */
-static void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms, const int s_nodes,
+static APART void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms, const int s_nodes,
                           __global const float *series, __global float *here, __global float *opposite) {
     float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
     ROLLED for (int n = 0; n < terms; n += 2) {

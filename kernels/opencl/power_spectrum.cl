@@ -26,6 +26,8 @@
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #endif
 #define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
+/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
+#define APART __attribute__((noinline))
 
 typedef struct {
     double dfx, dfy;            /* spacing of the DFT's frequencies, 1/um */
@@ -34,7 +36,7 @@ typedef struct {
 } Grid;
 
 /* g(d - j df), j = -reach .. reach, for four d: one exponential for all, as g(d - j df) = g(d) exp(d df / sigma_f^2)^j g(j df) */
-static void window_weights(const double4 d, const double df, const double inverse_2_variance, __global const double *decay,
+static APART void window_weights(const double4 d, const double df, const double inverse_2_variance, __global const double *decay,
                            const int reach, double4 *weight) {
     const double4 ratio = exp(2.0 * df * inverse_2_variance * d), inverse = 1.0 / ratio;
     double4 up = exp(-inverse_2_variance * d * d), down = up;
@@ -72,7 +74,7 @@ static void weighted_sum(__global const double *cells, const long stride, const 
 /* (2 - [n = 0]) J_n(-z), n < terms, for eight z >= 0, into factors[lane][terms]: Miller's downward recurrence from where
  * J_n is below 1e-16, normalised by J_0 + 2 J_2 + 2 J_4 + ... = 1. Each lane starts at its own order, so small z cannot
  * overflow. `j` holds 8 * terms. */
-static void bessel_factors(double8 z, const int terms, __global double *j, __global double *factors) {
+static APART void bessel_factors(double8 z, const int terms, __global double *j, __global double *factors) {
     z = fmax(z, (double8)1e-12);
     const double8 start = ceil(z + 11.0 * cbrt(z) + 5.0);
     const double8 two_over_z = 2.0 / z;
@@ -110,7 +112,7 @@ static double total(const double8 x) {
 }
 
 /* |sum_n i^n factors_n F_n|^2, F_n conjugated where turn is -1: h is real, so P(-f; s) has the conjugate coefficients */
-static double power_of(__global const double *f_n, __global const double *factors, const int blocks, const double turn) {
+static APART double power_of(__global const double *f_n, __global const double *factors, const int blocks, const double turn) {
     double8 re = 0.0, im = 0.0;
     ROLLED for (int b = 0; b < blocks; ++b) {
         const double8 factor = vload8(b, factors);
@@ -133,7 +135,7 @@ static double next_w(__global const double4 *directions, const int d, const int 
 
 /* F_n of one wavelength, from the window that begins at (row, column): sums over rows of the columns from `fresh` on, which
  * the ring does not hold yet, then the sum over all of the window's columns. Column c stands at c % taps of the ring. */
-static void gather(__global const double *stack, const int columns, const int width, const int row, const int column,
+static APART void gather(__global const double *stack, const int columns, const int width, const int row, const int column,
                    const int fresh, const int taps_x, const int taps_y, const double4 *along_x, const double4 *along_y,
                    const int lane, __global double *ring, __global double *f_n) {
     ROLLED for (int c = max(column, fresh); c < column + taps_x; ++c)
@@ -143,7 +145,7 @@ static void gather(__global const double *stack, const int columns, const int wi
 }
 
 /* One line, directions[begin .. end - 1], at four wavelengths. */
-static void line_power(__global const double *stack, __global const double *decay, const Grid grid, const int blocks,
+static APART void line_power(__global const double *stack, __global const double *decay, const Grid grid, const int blocks,
                        const int reach_x, const int reach_y, const int begin, const int end,
                        __global const double4 *directions, __global const int *place, const double4 lambda,
                        const double half_range, const double fx_max, const double fy_max, __global double *scratch,

@@ -17,13 +17,15 @@
  * from the polynomial through these.
  *
  * Given at launch: s_nodes, and w_terms, a multiple of 4. Set by the host: ORDER (even); MOST_RINGS of a group;
- * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps; W_BLOCK and SHARE_BLOCK (1, 2 or 4), nodes of w
- * whose sums stay in registers.
+ * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in
+ * registers.
  */
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define UNROLL _Pragma("unroll")
 #define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
+/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
+#define APART __attribute__((noinline))
 #define CHUNK 24  /* points whose G waits in the nearest cache */
 
 typedef struct {
@@ -43,7 +45,7 @@ typedef struct {
 static double node(__global const double *radius, const int i) { return i < 0 ? -radius[-i] : radius[i]; }
 
 /* Lagrange's polynomials on the ORDER nodes at `x`, at `at` */
-static void lagrange(const double *x, const double at, float *weight) {
+static APART void lagrange(const double *x, const double at, float *weight) {
     ROLLED for (int a = 0; a < ORDER; ++a) {
         double above = 1.0, below = 1.0;
         ROLLED for (int b = 0; b < ORDER; ++b) {
@@ -55,7 +57,7 @@ static void lagrange(const double *x, const double at, float *weight) {
 }
 
 /* What one ring takes of each of its group's points. Wavelengths ascend, so the points about them descend. */
-static void share_points(const Group group, const Ring ring, const double stretch, __global const double *line,
+static APART void share_points(const Group group, const Ring ring, const double stretch, __global const double *line,
                          __global const double *lambda, __global const float4 *weights,
                          __global const float *reflectance, const int w_terms, __global float *shares,
                          __global int2 *span) {
@@ -166,7 +168,7 @@ ALONG_LINE(block_on_radius, __global)
 ALONG_LINE(block_between_radii, __private)
 
 /* E of a point between ORDER radii, at every node in s, for both tiles */
-static void between_radii(__global const float *here, __global const float *opposite, const int first,
+static APART void between_radii(__global const float *here, __global const float *opposite, const int first,
                           __global const float *along_r, const int s_nodes, float *e_here, float *e_opposite) {
     __global const float *row_here[ORDER], *row_opposite[ORDER];
     ROLLED for (int k = 0; k < ORDER; ++k) {
@@ -188,33 +190,30 @@ static void between_radii(__global const float *here, __global const float *oppo
     }
 }
 
-/* What CHUNK points or fewer add to a ring's X, Y, Z at SHARE_BLOCK nodes of w from m on, for both tiles.
+/* What CHUNK points or fewer add to a ring's X, Y, Z at node m of w, for both tiles.
  *
  *   line    [points][w_terms][2]       G
  *   sum     [3][w_terms][2]            the ring's
  */
-static void add_shares(const float16 (*line)[2], const int points, const int m, const int w_terms,
+static APART void add_shares(const float16 (*line)[2], const int points, const int m, const int w_terms,
                        __global const float *shares, float16 (*sum)[2]) {
-    float16 part[3][SHARE_BLOCK][2];
+    float16 part[3][2];
     UNROLL for (int c = 0; c < 3; ++c)
-        UNROLL for (int k = 0; k < SHARE_BLOCK; ++k)
-            UNROLL for (int tile = 0; tile < 2; ++tile) part[c][k][tile] = sum[c * w_terms + m + k][tile];
-    ROLLED for (int p = 0; p < points; ++p)
-        UNROLL for (int k = 0; k < SHARE_BLOCK; ++k) {
-            const float16 a = line[p * w_terms + m + k][0], b = line[p * w_terms + m + k][1];
-            UNROLL for (int c = 0; c < 3; ++c) {
-                const float16 share = shares[(p * 3 + c) * w_terms + m + k];
-                part[c][k][0] = fma(share, a, part[c][k][0]);
-                part[c][k][1] = fma(share, b, part[c][k][1]);
-            }
+        UNROLL for (int tile = 0; tile < 2; ++tile) part[c][tile] = sum[c * w_terms + m][tile];
+    ROLLED for (int p = 0; p < points; ++p) {
+        const float16 a = line[p * w_terms + m][0], b = line[p * w_terms + m][1];
+        UNROLL for (int c = 0; c < 3; ++c) {
+            const float16 share = shares[(p * 3 + c) * w_terms + m];
+            part[c][0] = fma(share, a, part[c][0]);
+            part[c][1] = fma(share, b, part[c][1]);
         }
+    }
     UNROLL for (int c = 0; c < 3; ++c)
-        UNROLL for (int k = 0; k < SHARE_BLOCK; ++k)
-            UNROLL for (int tile = 0; tile < 2; ++tile) sum[c * w_terms + m + k][tile] = part[c][k][tile];
+        UNROLL for (int tile = 0; tile < 2; ++tile) sum[c * w_terms + m][tile] = part[c][tile];
 }
 
 /* G of some points of a group at every node of w, for both tiles: [points][w_terms][2] */
-static void take_line(const Group group, const int from, const int to, __global const float *here,
+static APART void take_line(const Group group, const int from, const int to, __global const float *here,
                       __global const float *opposite, __global const int *place, __global const float *along_r,
                       __global const float *along_s, const int s_nodes, const int w_terms, float16 (*line)[2]) {
     ROLLED for (int p = group.first + from; p < group.first + to; ++p, line += w_terms) {
@@ -233,7 +232,7 @@ static void take_line(const Group group, const int from, const int to, __global 
 }
 
 /* A ring's Chebyshev terms over its own w, from values at its group's nodes */
-static void write_terms(const float16 (*sum)[2], __global const float *w_series, const int w_terms, const int tile,
+static APART void write_terms(const float16 (*sum)[2], __global const float *w_series, const int w_terms, const int tile,
                         const int tiles, __global float *ring) {
     ROLLED for (int c = 0; c < 3; ++c)
         ROLLED for (int k = 0; k < w_terms; ++k) {
@@ -275,7 +274,7 @@ __kernel void apply_operator(__global const float *spectrum, const int radii, __
             const int first = max(from, taken.x), points = min(to, taken.y) - first;
             __global const float *own = shares + (long)(rings[group.ring + i].shares + first) * 3 * w_terms;
             if (points > 0)
-                ROLLED for (int m = 0; m < w_terms; m += SHARE_BLOCK)
+                ROLLED for (int m = 0; m < w_terms; ++m)
                     add_shares(line + (first - from) * w_terms, points, m, w_terms, own, sum + i * 3 * w_terms);
         }
     }

@@ -9,12 +9,10 @@ from pipeline.progress import Progress, silent
 
 # by the constant's name, the kernels that it is for
 _KERNELS = {
-    "STEP_X": ("along_x",),
-    "STEP_Y": ("along_y",),
+    "STEP": ("along_x",),
     "KEPT": ("along_x", "along_y"),
     "USUAL_TAPS": ("polar_spectrum",),
     "W_BLOCK": ("apply_operator",),
-    "SHARE_BLOCK": ("apply_operator",),
 }
 
 
