@@ -1,8 +1,8 @@
-"""Bakes the scan that comes with the tool, by the API, into a folder.
+"""Bakes the example scan of configs/ with the API.
 
     python examples/bake_a_scan.py FOLDER
 
-It takes seconds, for the picture is small and the error budget wide; configs/scan.toml explains every key.
+It takes seconds, because the maps are small and the error budget is wide. configs/scan.toml explains every key.
 """
 
 import sys
@@ -16,7 +16,7 @@ SCAN = Path(__file__).resolve().parents[1] / "configs" / "example_scan.txt"
 
 
 def main(folder: Path) -> None:
-    # a few spikes of dust, six times as high as the relief, are cut
+    # clips spikes of dust, six times as high as the relief
     cleaning = {"level": "plane", "clip_percentile": (0.05, 99.9)}
     field = load_scan(SCAN, **cleaning)
     rows, columns = field.shape

@@ -1,4 +1,4 @@
-"""Prints what a bundle reflects in a few directions, from a light 30 degrees off the normal.
+"""Prints the colours that a bundle reflects into some directions, for a light 30 degrees from the normal.
 
 python examples/look_up.py BUNDLE
 """

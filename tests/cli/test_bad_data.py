@@ -11,7 +11,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 from PIL import Image
 
-from tests.cli.tool import Result, Tool, leavings
+from tests.cli.tool import Result, Tool, temporary_files
 from tests.support import shared_file
 
 RNG = np.random.default_rng(1)
@@ -23,18 +23,18 @@ def bake(tool: Tool, scan: Path, **keys: Any) -> Result:
     return tool("run", tool.config(surface={"path": str(scan), **keys}))
 
 
-def refused(tool: Tool, result: Result, *told: str) -> None:
+def refused(tool: Tool, result: Result, *message: str) -> None:
     """One line, the documented code, nothing behind."""
     assert result.code == 3, result.stderr
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     assert [line for line in result.stderr.splitlines() if line != "small:"] == result.errors
     (line,) = result.errors
-    for text in told:
+    for text in message:
         assert text in line
     assert tool.artifacts() == {}
     assert not tool.out.exists()
-    assert leavings(tool) == []
+    assert temporary_files(tool) == []
 
 
 def with_one(value: float) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ def test_empty_file(tool: Tool, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("heights", "told"),
+    ("heights", "message"),
     [
         (np.full((64, 64), 0.3), "heights that vary"),
         (HILLS[:1], "at least 8 samples along each axis"),
@@ -85,8 +85,8 @@ def test_empty_file(tool: Tool, name: str) -> None:
     ],
     ids=["constant", "row", "column", "1-D", "NaN", "mostly NaN", "inf", "-inf", "complex", "words"],
 )
-def test_values_that_no_height_map_has(tool: Tool, heights: NDArray[Any], told: str) -> None:
-    refused(tool, bake(tool, npy(tool, heights), **UNITS), "scan.npy", told)
+def test_values_that_no_height_map_has(tool: Tool, heights: NDArray[Any], message: str) -> None:
+    refused(tool, bake(tool, npy(tool, heights), **UNITS), "scan.npy", message)
 
 
 def test_huge(tool: Tool) -> None:
@@ -105,7 +105,7 @@ def test_pickled_objects_are_not_loaded(tool: Tool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("heights", "keys", "told"),
+    ("heights", "keys", "message"),
     [
         (1e-6 * HILLS, UNITS, "surface.height_unit"),  # metres taken for micrometres
         (1e3 * HILLS, {**UNITS, "height_unit": "mm"}, "surface.height_unit"),
@@ -114,12 +114,12 @@ def test_pickled_objects_are_not_loaded(tool: Tool) -> None:
     ],
     ids=["metres as um", "nanometres as mm", "pitch in pm", "pitch in m"],
 )
-def test_mislabelled_units(tool: Tool, heights: NDArray[Any], keys: dict[str, Any], told: str) -> None:
-    refused(tool, bake(tool, npy(tool, heights), **keys), "mislabelled units?", told)
+def test_mislabelled_units(tool: Tool, heights: NDArray[Any], keys: dict[str, Any], message: str) -> None:
+    refused(tool, bake(tool, npy(tool, heights), **keys), "mislabelled units?", message)
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "message"),
     [
         ({}, "set surface.pitch_um (sample distance in um) and surface.height_unit ('nm', 'um', ...)"),
         ({"pitch_um": 0.1}, "set surface.height_unit"),
@@ -127,10 +127,10 @@ def test_mislabelled_units(tool: Tool, heights: NDArray[Any], keys: dict[str, An
     ],
 )
 @pytest.mark.parametrize("form", ["text", "npy"])
-def test_units_are_asked_for_and_not_guessed(tool: Tool, form: str, keys: dict[str, Any], told: str) -> None:
+def test_units_are_asked_for_and_not_guessed(tool: Tool, form: str, keys: dict[str, Any], message: str) -> None:
     rows = "\n".join(" ".join(f"{h:.4f}" for h in row) for row in HILLS)
     path = text(tool, rows) if form == "text" else npy(tool, HILLS)
-    refused(tool, bake(tool, path, **keys), "does not state them", told)
+    refused(tool, bake(tool, path, **keys), "does not state them", message)
 
 
 def test_an_image_needs_its_height_range(tool: Tool) -> None:
@@ -180,7 +180,7 @@ def test_a_hopeless_pitch_is_refused(tool: Tool) -> None:
     refused(tool, result, "tells nothing of 9", "0.135 um or finer")
 
 
-def test_holes_and_dust_are_mended_and_counted(tool: Tool) -> None:
+def test_holes_and_dust_are_corrected_and_counted(tool: Tool) -> None:
     heights = HILLS.copy()
     heights[40:44, 50:53] = np.nan
     heights[10, 10] = 5.0

@@ -51,8 +51,8 @@ def test_every_fault_at_once_with_its_key(tool: Tool, command: str) -> None:
     assert result.code == 2
     assert result.stdout == ""
     assert result.errors == result.stderr.splitlines()
-    told = [line.removeprefix("error: faulty.toml: ").split(": ")[0] for line in result.errors]
-    assert sorted(told) == sorted(FAULTY_KEYS)
+    keys = [line.removeprefix("error: faulty.toml: ").split(": ")[0] for line in result.errors]
+    assert sorted(keys) == sorted(FAULTY_KEYS)
     assert untouched(tool)
 
 
@@ -75,7 +75,7 @@ def test_two_configs_of_one_name_would_share_a_folder(tool: Tool, command: str) 
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (b"", "name: required, but missing"),
         (b"name = ", "not valid TOML"),
@@ -84,17 +84,17 @@ def test_two_configs_of_one_name_would_share_a_folder(tool: Tool, command: str) 
         (b'name = "x"\n[surface]\n', "surface: expected either 'path' (a scan) or 'recipe'"),
     ],
 )
-def test_what_is_no_config(tool: Tool, content: bytes, told: str) -> None:
+def test_files_that_are_no_config(tool: Tool, content: bytes, message: str) -> None:
     (tool.folder / "x.toml").write_bytes(content)
     result = tool("run", "x.toml")
     assert result.code == 2
-    assert any(line.startswith(f"error: x.toml: {told}") for line in result.errors), result.stderr
+    assert any(line.startswith(f"error: x.toml: {message}") for line in result.errors), result.stderr
     assert "Traceback" not in result.stderr
     assert untouched(tool)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["bake"], "No such command 'bake'"),
         (["run"], "Missing argument 'CONFIG...'"),
@@ -107,11 +107,11 @@ def test_what_is_no_config(tool: Tool, content: bytes, told: str) -> None:
         (["store", "burn"], "No such command 'burn'"),
     ],
 )
-def test_wrong_usage(tool: Tool, arguments: list[str], told: str) -> None:
+def test_wrong_usage(tool: Tool, arguments: list[str], message: str) -> None:
     result = tool(*arguments)
     assert result.code == 2
     assert result.stdout == ""
-    assert told in result.stderr
+    assert message in result.stderr
     assert "Traceback" not in result.stderr
     assert untouched(tool)
 

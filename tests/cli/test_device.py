@@ -1,4 +1,4 @@
-"""No device: told before any work, with the remedy. A device is found once a process, so each has its own."""
+"""No device: reported before any work, with the remedy. Each test has a process, which finds its device once."""
 
 import os
 import subprocess
@@ -29,7 +29,7 @@ def test_without_a_device_nothing_is_begun(tool: Tool, command: str) -> None:
     assert not tool.out.exists()
 
 
-def test_what_is_cached_needs_no_device(baked: Tool) -> None:
+def test_cached_stages_need_no_device(baked: Tool) -> None:
     assert baked.process("run", "small.toml", environment=NO_DEVICE).code == 0
 
 
@@ -62,14 +62,14 @@ def test_doctor(tool: Tool) -> None:
 
 
 def test_doctor_for_machines(tool: Tool) -> None:
-    told = tool("doctor", "--json").json
+    printed = tool("doctor", "--json").json
     used = tool("doctor").stdout.splitlines()[-1]
-    assert any(not d["fault"] and d["device"] in used for d in told["devices"])
-    assert told["versions"]["diffract-bake"]
+    assert any(not d["fault"] and d["device"] in used for d in printed["devices"])
+    assert printed["versions"]["diffract-bake"]
 
 
 def test_a_device_without_a_context_is_a_fault_and_no_traceback() -> None:
-    """A driver that lists a device and cannot open it is reported by doctor, beside those that work."""
+    """A driver that lists a device and cannot open it is reported by doctor, next to those that work."""
     refused = mock.patch.object(pyopencl, "Context", side_effect=pyopencl.Error("no such context"))
     platform, listed = device._listed()[0]
     with refused:
@@ -86,7 +86,7 @@ def test_errors_of_the_compiler_come_through() -> None:
 
 @dataclass(frozen=True)
 class Listed:
-    """What the choice reads of a platform or a device."""
+    """The attributes of a platform or a device that the choice reads."""
 
     name: str
     type: int = 0
@@ -122,7 +122,7 @@ def test_kernels_can_be_built_for_a_processor_without_avx512(tmp_path: Path) -> 
         pytest.skip("this processor has no AVX2")
     script = "from kernels import device; print(device.default_device().vector_width)"
     avx2 = {"POCL_KERNELLIB_NAME": "avx2", "POCL_LLVM_CPU_NAME": "haswell", "XDG_CACHE_HOME": str(tmp_path)}
-    told = subprocess.run(
+    printed = subprocess.run(
         [sys.executable, "-c", script], env={**os.environ, **avx2}, cwd=REPOSITORY, capture_output=True, text=True
     )
-    assert told.stdout == "8\n", told.stderr
+    assert printed.stdout == "8\n", printed.stderr

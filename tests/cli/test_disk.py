@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.tool import Result, Tool, leavings, mounted
+from tests.cli.tool import Result, Tool, mounted, temporary_files
 
 
 def refused(result: Result) -> None:
@@ -31,7 +31,7 @@ def test_the_store_is_full(tool: Tool, small_disk: Path) -> None:
     result = cramped("run", cramped.config(surface={"recipe": {"kind": "sinusoid", "size_um": 40, "pitch_um": 0.1}}))
     refused(result)
     assert "no space left to write; free some, or choose another folder" in result.errors[0]
-    assert leavings(cramped) == []
+    assert temporary_files(cramped) == []
     assert cramped("store", "check").code == 0
     assert not cramped.out.exists()
 

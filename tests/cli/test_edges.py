@@ -8,10 +8,10 @@ from unittest import mock
 
 import pytest
 
-from tests.cli.tool import COMMAND, Tool, flip_a_byte, leavings, mounted, recipe, too_wide
+from tests.cli.tool import COMMAND, Tool, flip_a_byte, mounted, recipe, temporary_files, too_wide
 
 
-def test_collect_leaves_what_is_no_artifact_alone(tool: Tool) -> None:
+def test_collect_keeps_files_that_are_no_artifacts(tool: Tool) -> None:
     mine = tool.store / "photos" / "2024" / "a.jpg"
     mine.parent.mkdir(parents=True)
     mine.write_text("precious", encoding="utf-8")
@@ -37,7 +37,7 @@ def test_a_folder_where_a_file_should_be(copy: Tool) -> None:
     (copy.folder / "taken" / "small" / "report.html").mkdir(parents=True)
     result = copy("run", "small.toml", "--out", "taken")
     assert result.code == 7, result.stderr
-    assert leavings(copy) == []
+    assert temporary_files(copy) == []
 
 
 @pytest.mark.parametrize("option", ["--theta=nan", "--phi=inf", "--phi=nan", "--exposure=nan", "--exposure=inf"])
@@ -115,7 +115,7 @@ def test_a_full_disk_leaves_no_part_of_a_map(baked: Tool, tool: Tool, size: str)
         assert [path for path in out.rglob("*") if path.is_file()] == []
 
 
-def test_run_says_that_the_standing_bundle_was_changed(copy: Tool) -> None:
+def test_run_reports_that_the_existing_bundle_was_changed(copy: Tool) -> None:
     flip_a_byte(copy.bundle() / "tables" / "I_00.exr")
     result = copy("run", "small.toml")
     assert result.code == 6, result.stderr

@@ -68,14 +68,14 @@ def test_header_comments_and_blank_lines_are_optional(baked: Tool) -> None:
 
 def test_json(baked: Tool) -> None:
     asked = "0,0,13,0\n30,0,30,180\n"
-    told = ask(baked, "small.toml", "--json", text=asked).json
-    assert [list(row) for row in told] == [["X", "Y", "Z"]] * 2
-    found = np.array([list(row.values()) for row in told])
+    printed = ask(baked, "small.toml", "--json", text=asked).json
+    assert [list(row) for row in printed] == [["X", "Y", "Z"]] * 2
+    found = np.array([list(row.values()) for row in printed])
     np.testing.assert_allclose(found, xyz(ask(baked, "small.toml", text=asked)), rtol=1e-11)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("0,0,10,0\n0,0,10\n", "-: line 2: expected four numbers"),
         ("0,0,10,0\n\n0,0,ten,0\n", "-: line 3: expected four numbers"),
@@ -88,12 +88,12 @@ def test_json(baked: Tool) -> None:
         ("", "got none"),
     ],
 )
-def test_faults_of_the_csv_name_their_line(baked: Tool, text: str, told: str) -> None:
+def test_faults_of_the_csv_name_their_line(baked: Tool, text: str, message: str) -> None:
     result = ask(baked, "small.toml", text=text)
     assert result.code == 3
     assert result.stdout == ""
     (line,) = result.errors
-    assert told in line
+    assert message in line
 
 
 def test_a_csv_that_is_none(baked: Tool, tool: Tool) -> None:

@@ -16,7 +16,7 @@ def test_every_config_bakes(tool: Tool, published: Path, path: Path) -> None:
     name = tomllib.loads(path.read_text(encoding="utf-8"))["name"]
     result = tool("run", path, "--json", "--store", published)
     assert result.code == 0, result.stderr
-    assert [told["name"] for told in result.json] == [name]
+    assert [printed["name"] for printed in result.json] == [name]
     report = (tool.out / name / "report.html").read_text(encoding="utf-8")
     assert f"<title>{name}</title>" in report
     assert tool("verify", tool.bundle(name)).code == 0
@@ -27,6 +27,6 @@ def test_several_configs_bake_in_one_command(copy: Tool) -> None:
     """In their order; the second is the first under another name."""
     result = copy("run", "small.toml", copy.config("other.toml", name="other"), "--json")
     assert result.code == 0, result.stderr
-    assert [told["name"] for told in result.json] == ["small", "other"]
+    assert [printed["name"] for printed in result.json] == ["small", "other"]
     for name in ("small", "other"):
         assert copy("verify", copy.bundle(name)).code == 0

@@ -29,11 +29,11 @@ def test_every_command_speaks_json(tool: Tool, command: list[str]) -> None:
     assert "--json" in tool(*command, "--help").stdout
 
 
-def test_help_lists_every_command_with_what_it_does(tool: Tool) -> None:
+def test_help_lists_every_command_with_its_purpose(tool: Tool) -> None:
     text = tool("-h").stdout
     lines = {line.split()[0]: line.split(maxsplit=1)[1] for line in text.split("Commands:")[1].splitlines() if line}
     assert set(lines) == set(_COMMANDS)
-    assert all(len(told) > 15 for told in lines.values())
+    assert all(len(text) > 15 for text in lines.values())
 
 
 def test_without_arguments_it_shows_help(tool: Tool) -> None:
@@ -60,10 +60,10 @@ def test_help_is_instant(tool: Tool) -> None:
 
 
 def test_store_list(baked: Tool) -> None:
-    told = baked("store", "list", "--json").json
-    assert told["root"] == str(baked.store)
+    printed = baked("store", "list", "--json").json
+    assert printed["root"] == str(baked.store)
     found: dict[str, list[str]] = {}
-    for artifact in told["artifacts"]:
+    for artifact in printed["artifacts"]:
         assert artifact["name"] == "small"
         assert artifact["bytes"] > 0
         found.setdefault(artifact["stage"], []).append(artifact["key"])
@@ -82,7 +82,7 @@ def test_an_empty_store(tool: Tool) -> None:
     assert not tool.store.exists()
 
 
-def test_collect_removes_what_was_long_unused(copy: Tool) -> None:
+def test_collect_removes_artifacts_that_were_long_unused(copy: Tool) -> None:
     assert copy("store", "collect", "--unused-days", "1").stdout.startswith("removed 0 folders")
     assert copy("store", "collect", "--unused-days", "0").stdout.startswith("removed 6 folders")
     assert copy.artifacts() == {}

@@ -25,9 +25,9 @@ def test_a_scan_with_units(tool: Tool) -> None:
 def test_text_for_people_tells_the_same(tool: Tool) -> None:
     result = tool("inspect", SCAN)
     assert (result.code, result.stderr) == (0, "")
-    told = {line[:16].strip(): line[17:] for line in result.stdout.splitlines()}
+    printed = {line[:16].strip(): line[17:] for line in result.stdout.splitlines()}
     found = tool("inspect", SCAN, "--json").json
-    assert told == {key: v if isinstance(v, str) else json.dumps(v) for key, v in found.items()}
+    assert printed == {key: v if isinstance(v, str) else json.dumps(v) for key, v in found.items()}
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_bundle(baked: Tool) -> None:
     assert "licence          not stated" in baked("inspect", baked.bundle()).stdout
 
 
-def test_what_cannot_be_inspected(tool: Tool) -> None:
+def test_files_that_cannot_be_inspected(tool: Tool) -> None:
     assert tool("inspect", "none").code == 2
     assert tool("inspect", tool.folder).code == 6
     (tool.folder / "odd.bin").write_bytes(bytes(range(256)))

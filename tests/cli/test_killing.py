@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.tool import Tool, leavings
+from tests.cli.tool import Tool, temporary_files
 from tests.support import killed_at
 
 STAGES = ["surface", "stack", "table", "render", "validate"]
@@ -77,7 +77,7 @@ def test_killed_while_results_are_laid_out_and_published(baked: Tool, copy: Tool
 
 
 def assert_ends_as(undisturbed: Tool, tool: Tool) -> None:
-    """One more run makes what an undisturbed one did, and the leavings go."""
+    """One more run makes what an undisturbed one did, and removes the temporary files."""
     result = tool.process("run", "small.toml")
     assert result.code == 0, result.stderr
     assert tool.artifacts() == undisturbed.artifacts()
@@ -89,7 +89,7 @@ def assert_ends_as(undisturbed: Tool, tool: Tool) -> None:
     for name in shown[:3]:
         assert (tool.out / "small" / name).read_bytes() == (undisturbed.out / "small" / name).read_bytes()
     assert tool("store", "collect").code == 0
-    assert leavings(tool) == []
+    assert temporary_files(tool) == []
 
 
 def test_interrupted_by_the_keyboard(tool: Tool) -> None:
@@ -98,24 +98,24 @@ def test_interrupted_by_the_keyboard(tool: Tool) -> None:
     assert result.stderr.splitlines()[-1] == "interrupted; finished stages are kept"
     assert "Traceback" not in result.stderr
     assert list(tool.artifacts()) == ["render", "stack", "surface", "table"]
-    assert leavings(tool) == []
+    assert temporary_files(tool) == []
 
 
 @pytest.mark.parametrize("outs", [("out", "out"), ("one", "two")], ids=["one folder", "two folders"])
 def test_two_runs_at_once_share_the_work(baked: Tool, tool: Tool, outs: tuple[str, str]) -> None:
     config = tool.config()
     both = [tool.start("run", config, "--out", out) for out in outs]
-    told = []
+    printed = []
     for process in both:
         with process:
-            told.append(process.communicate(timeout=120)[1])
-    assert [process.returncode for process in both] == [0, 0], told
+            printed.append(process.communicate(timeout=120)[1])
+    assert [process.returncode for process in both] == [0, 0], printed
     for stage in STAGES:
         # made by one of them, cached for the other
-        lines = [line for text in told for line in text.splitlines() if re.match(rf"  {stage} ", line)]
+        lines = [line for text in printed for line in text.splitlines() if re.match(rf"  {stage} ", line)]
         assert sorted("cached" in line for line in lines) == [False, True], stage
     assert tool.artifacts() == baked.artifacts()
-    assert leavings(tool) == []
+    assert temporary_files(tool) == []
     for out in {*outs}:
         assert bundles(tool.folder / out) == [baked.bundle().name]
     assert tool("store", "check").code == 0

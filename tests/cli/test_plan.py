@@ -18,15 +18,15 @@ def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> No
 
 
 def test_after_a_run_all_is_cached(baked: Tool) -> None:
-    told = baked("plan", "small.toml", "--json").json
-    assert list(told) == ["small"]
-    assert [step["stage"] for step in told["small"]] == STAGES
-    assert {step["state"] for step in told["small"]} == {"cached"}
-    assert {step["stage"]: [step["key"]] for step in told["small"]} == baked.artifacts()
-    assert all("last time" in step["cost"] for step in told["small"])
+    printed = baked("plan", "small.toml", "--json").json
+    assert list(printed) == ["small"]
+    assert [step["stage"] for step in printed["small"]] == STAGES
+    assert {step["state"] for step in printed["small"]} == {"cached"}
+    assert {step["stage"]: [step["key"]] for step in printed["small"]} == baked.artifacts()
+    assert all("last time" in step["cost"] for step in printed["small"])
 
 
-def test_a_changed_key_is_named_with_both_values_and_what_follows_from_it(copy: Tool) -> None:
+def test_a_changed_key_is_named_with_both_values_and_its_consequences(copy: Tool) -> None:
     before = copy.artifacts()
     steps = {s["stage"]: s for s in copy("plan", copy.config(table={"tolerance": 0.01}), "--json").json["small"]}
     assert [steps[stage]["state"] for stage in STAGES] == ["cached", *["to do"] * 5]
@@ -37,11 +37,11 @@ def test_a_changed_key_is_named_with_both_values_and_what_follows_from_it(copy: 
     assert copy.artifacts() == before
 
 
-def test_a_change_late_in_the_line_leaves_the_early_stages(copy: Tool) -> None:
-    told = copy("plan", copy.config(render={"size": 48}))
-    states = {line.split()[0]: line for line in told.stdout.splitlines()[2:8]}
+def test_a_change_of_a_late_stage_keeps_the_early_ones(copy: Tool) -> None:
+    printed = copy("plan", copy.config(render={"size": 48}))
+    states = {line.split()[0]: line for line in printed.stdout.splitlines()[2:8]}
     assert all("cached" in states[stage] for stage in ("surface", "stack", "table"))
-    assert "render: changed: render.size 32 -> 48" in told.stdout.splitlines()
+    assert "render: changed: render.size 32 -> 48" in printed.stdout.splitlines()
 
 
 def test_several_configs(baked: Tool, tool: Tool) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cli.tool import SMALL, Tool, leavings, toml
+from tests.cli.tool import SMALL, Tool, temporary_files, toml
 
 pytestmark = pytest.mark.slow
 
@@ -51,15 +51,15 @@ def polar(first: Tool, tmp_path: Path) -> Tool:
 def test_a_bake_with_a_cold_kernel_cache_writes_progress_alone(tool: Tool) -> None:
     """No compiler's warnings and no library's lines; and that kernels are compiled is said in the first run only."""
     config, cold = write(tool), {"XDG_CACHE_HOME": str(tool.folder / "cache")}
-    told = "  compiling kernels for this processor, once ..."
+    printed = "  compiling kernels for this processor, once ..."
     result = tool.process("run", config, environment=cold)
     assert result.code == 0, result.stderr
-    progress = r"small:|  \w+ +([\d.]+ s|cached)|  [\w ]+: \d+ % after \d+ s \.\.\.|" + re.escape(told)
+    progress = r"small:|  \w+ +([\d.]+ s|cached)|  [\w ]+: \d+ % after \d+ s \.\.\.|" + re.escape(printed)
     assert [line for line in result.stderr.splitlines() if not re.fullmatch(progress, line)] == []
-    assert result.stderr.splitlines().count(told) == 1
+    assert result.stderr.splitlines().count(printed) == 1
     again = tool.process("run", config, "--store", tool.folder / "another", environment=cold)
     assert again.code == 0, again.stderr
-    assert told not in again.stderr
+    assert printed not in again.stderr
 
 
 def states(tool: Tool, path: Path) -> dict[str, str]:
@@ -76,16 +76,16 @@ def test_a_run_leaves_maps_a_report_and_a_bundle(first: Tool) -> None:
 def test_validation_tells_the_errors_of_the_certificate(first: Tool) -> None:
     """The table was put to the checks on random directions once, for its certificate, and not again."""
     made = first("run", first.folder / "small.toml", "--json").json[0]["stages"]
-    certified, told = made["table"]["summary"]["certificate"], made["validate"]["summary"]
-    assert told["random"] == certified["random"]
-    assert told["reference"] == certified["reference"]
-    at_exposure = [e["mean"] for e in told["random"]["colour"] if e["exposure_ru"] == certified["exposure_ru"]]
+    certified, printed = made["table"]["summary"]["certificate"], made["validate"]["summary"]
+    assert printed["random"] == certified["random"]
+    assert printed["reference"] == certified["reference"]
+    at_exposure = [e["mean"] for e in printed["random"]["colour"] if e["exposure_ru"] == certified["exposure_ru"]]
     assert at_exposure == [certified["measured"]]
 
 
 def test_a_second_illuminant_reuses_the_power_spectrum(polar: Tool) -> None:
-    told = states(polar, write(polar, spectrum={"illuminant": "A"}))
-    assert [told[stage] for stage in STAGES] == ["cached", "cached", *["to do"] * 4]
+    printed = states(polar, write(polar, spectrum={"illuminant": "A"}))
+    assert [printed[stage] for stage in STAGES] == ["cached", "cached", *["to do"] * 4]
     observer = "CIE 1964 10 Degree Standard Observer"
     assert states(polar, write(polar, spectrum={"observer": observer}))["power_spectrum"] == "cached"
     material = {"fresnel": "conductor", "metal": "Au"}
@@ -99,9 +99,9 @@ def test_a_run_may_stop_at_the_certified_table(tool: Tool) -> None:
     assert sorted(tool.artifacts()) == ["power_spectrum", "surface", "table"]
     assert not tool.out.exists()
     assert "on 2000 random directions, 0.5 allowed" in result.stdout
-    told = tool("run", write(tool), "--until", "table", "--json").json[0]["stages"]["table"]["summary"]
-    assert told["certificate"]["measured"] <= 0.5
-    assert told["certificate"]["reference"]["maximum"] < 1e-6
+    printed = tool("run", write(tool), "--until", "table", "--json").json[0]["stages"]["table"]["summary"]
+    assert printed["certificate"]["measured"] <= 0.5
+    assert printed["certificate"]["reference"]["maximum"] < 1e-6
 
 
 def test_a_bake_that_misses_its_budget_says_so_and_fails(tool: Tool) -> None:
@@ -112,7 +112,7 @@ def test_a_bake_that_misses_its_budget_says_so_and_fails(tool: Tool) -> None:
     assert "accuracy.delta_e allows 0.5" in line
     assert "table" not in tool.artifacts()
     assert not tool.out.exists()
-    assert leavings(tool) == []
+    assert temporary_files(tool) == []
 
 
 def test_table_and_reference_agree_through_eval(first: Tool) -> None:
@@ -144,7 +144,7 @@ def test_single_wavelengths_need_the_spectral_form(polar: Tool) -> None:
     assert polar(*asked[:-1], "100").code == 2
 
 
-def test_a_scene_leaves_the_rest_out(tool: Tool) -> None:
+def test_directions_outside_the_scene_are_omitted(tool: Tool) -> None:
     scene = {"lights": [{"theta_deg": 20}], "views": {"theta_max_deg": 30}}
     path = write(tool, scene=scene)
     assert tool("run", path, "--until", "table").code == 0

@@ -54,7 +54,7 @@ def test_command(copy: Tool, published: Path, command: str) -> None:
         "FILE.csv": "directions.csv",
     }
     if command.startswith("bench "):
-        # beside plain numpy in relative digits: a grating has I_p that are nothing
+        # compared with plain numpy by relative errors: some I_p of a grating are 0
         files["CONFIG"] = copy.config("rough.toml", surface=recipe("gaussian")).name
     words = [files.get(word, word) for word in shlex.split(command)]
     assert not any(re.fullmatch(r"[A-Z]{2,}\S*", word) for word in words), f"unknown placeholder in {command!r}"
@@ -65,15 +65,15 @@ def test_command(copy: Tool, published: Path, command: str) -> None:
     assert result.stdout
 
 
-def test_make_targets_exist_and_are_told() -> None:
+def test_make_targets_exist_and_are_listed() -> None:
     assert {"bake", "test", "bench", "pipeline"} <= set(TARGETS)
-    told = subprocess.run(["make", "-C", str(REPOSITORY)], capture_output=True, text=True, check=True).stdout
+    printed = subprocess.run(["make", "-C", str(REPOSITORY)], capture_output=True, text=True, check=True).stdout
     helped = subprocess.run(["make", "-C", str(REPOSITORY), "help"], capture_output=True, text=True, check=True)
-    assert told == helped.stdout
+    assert printed == helped.stdout
     for target in TARGETS:
         command = ["make", "-C", str(REPOSITORY), "-n", target, "CONFIG=configs/scan.toml"]
         subprocess.run(command, capture_output=True, check=True)
-        assert f"make {target}" in told
+        assert f"make {target}" in printed
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -97,7 +97,7 @@ def test_exit_codes_are_those_of_the_code() -> None:
     assert table == {0, 130} | raised
 
 
-def test_every_config_and_every_key_is_told() -> None:
+def test_every_config_and_every_key_is_documented() -> None:
     from pipeline.config.models import Config
 
     for path in (REPOSITORY / "configs").glob("*.toml"):

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 
 from pipeline.report import images
-from tests.cli.tool import Result, Tool, files, leavings, too_wide
+from tests.cli.tool import Result, Tool, files, temporary_files, too_wide
 
 STAGES = ["surface", "stack", "table", "render", "validate", "bundle"]
 
@@ -19,7 +19,7 @@ def test_makes_maps_report_and_bundle(baked: Tool) -> None:
     assert re.fullmatch(r"small-1\.0\.0\+[0-9a-f]{12}", baked.bundle().name)
     inside = {path.name for path in baked.bundle().iterdir()}
     assert {"tables", "maps", "manifest.json", "evaluate.py", "README.md", "report.html", "SHA256SUMS"} <= inside
-    assert leavings(baked) == []
+    assert temporary_files(baked) == []
 
 
 def test_maps_have_the_size_asked_for_and_show_the_same_light(baked: Tool) -> None:
@@ -83,20 +83,20 @@ def test_a_second_run_finds_all_cached_and_changes_nothing(baked: Tool) -> None:
     bundle = [name for name in after if baked.bundle().name in name]
     assert all(after[name] == before[0][name] for name in bundle)
     assert baked.artifacts() == before[1]
-    assert leavings(baked) == []
+    assert temporary_files(baked) == []
     assert min(seconds) < 2.0
 
 
 def test_json_is_one_document_and_alone_on_stdout(baked: Tool) -> None:
     result = baked("run", "small.toml", "--json")
-    (told,) = result.json
-    assert told["name"] == "small"
-    assert list(told["stages"]) == STAGES
-    assert {name: [stage["key"]] for name, stage in told["stages"].items()} == baked.artifacts()
-    assert [baked.folder / file for file in told["files"]] == [
+    (printed,) = result.json
+    assert printed["name"] == "small"
+    assert list(printed["stages"]) == STAGES
+    assert {name: [stage["key"]] for name, stage in printed["stages"].items()} == baked.artifacts()
+    assert [baked.folder / file for file in printed["files"]] == [
         baked.out / "small" / name for name in ("map_theta0_phi0.exr", "map_theta0_phi0.png", "report.html")
     ]
-    assert baked.folder / told["bundle"] == baked.bundle()
+    assert baked.folder / printed["bundle"] == baked.bundle()
     assert "cached" in result.stderr
 
 

@@ -37,7 +37,7 @@ def test_it_knows_every_config(path: Path) -> None:
     assert any(fault.startswith(".table.layout") for fault in found)
 
 
-def test_it_knows_what_a_bundle_says_of_itself(baked: Tool) -> None:
+def test_it_knows_every_key_of_a_manifest(baked: Tool) -> None:
     schema = schema_of("manifest")
     document = json.loads((baked.bundle() / "manifest.json").read_text(encoding="utf-8"))
     assert faults(schema, document, schema) == []

@@ -1,4 +1,4 @@
-"""What was changed after it was written is named, never used, and mended by what the message says."""
+"""Changed files are named and never used, and the remedy in the message works."""
 
 from pathlib import Path
 
@@ -96,7 +96,7 @@ def test_a_changed_bundle(copy: Tool, pattern: str) -> None:
     assert any(name in line for line in evaluated.errors)
 
 
-def test_an_unharmed_bundle(baked: Tool) -> None:
+def test_an_unchanged_bundle(baked: Tool) -> None:
     result = baked("verify", baked.bundle())
     assert (result.code, result.stderr) == (0, "")
     assert result.stdout == f"{baked.bundle()}: unchanged\n"

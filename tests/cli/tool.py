@@ -31,7 +31,7 @@ SMALL: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Result:
-    """What a command left: its exit code and what it printed."""
+    """The result of a command: its exit code and its output."""
 
     code: int
     stdout: str
@@ -158,8 +158,8 @@ def files(folder: Path) -> dict[str, tuple[int, bytes]]:
     return {path.relative_to(folder).as_posix(): (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
 
 
-def leavings(tool: Tool) -> list[str]:
-    """What work in progress may leave: it is hidden, or under the store's tmp."""
+def temporary_files(tool: Tool) -> list[str]:
+    """Files of work in progress: hidden ones, and those under the store's tmp."""
     hidden = [path for path in tool.folder.rglob(".*") if path.name not in (".", "..")]
     return [str(path) for path in (*hidden, *tool.store.glob("tmp/*"))]
 

@@ -25,7 +25,7 @@ def read(tmp_path, text):
 
 
 def faults(document, folder=Path()):
-    """What is wrong with a document, message by key path (the last where a key has several)."""
+    """The faults of a document: messages by path of the key (the last one where a key has several)."""
     with pytest.raises(ConfigError) as error:
         parse(document, "file.toml", folder)
     return dict(error.value.faults)
@@ -109,7 +109,7 @@ def test_a_scan_is_levelled_and_a_recipe_is_not():
     assert (recipe.levelling, scan.levelling) == ("none", "plane")
 
 
-def test_one_number_stands_for_both_axes():
+def test_one_number_applies_to_both_axes():
     """A pitch or size is a number, or [x, y]."""
     assert as_pair(0.5) == (0.5, 0.5)
     assert as_pair((0.5, 0.25)) == (0.5, 0.25)
@@ -145,7 +145,7 @@ def test_a_config_cannot_be_changed_after_it_was_read():
 
 
 def test_every_fault_is_reported_at_once(tmp_path):
-    """One run tells all that is to be mended, each with its key path, file faults and names included."""
+    """One run reports all faults, each with the path of its key, including those of files and names."""
     with pytest.raises(ConfigError) as error:
         read(
             tmp_path,
@@ -231,7 +231,7 @@ def test_every_fault_is_reported_at_once(tmp_path):
         ({**MINIMAL, "name": "a" * 65}, "name", "pattern"),
     ],
 )
-def test_fault_names_its_key_and_what_is_wrong(document, key, said):
+def test_a_fault_names_its_key_and_the_reason(document, key, said):
     """A fault's key path is the user's own, and its sentence tells what was expected or found."""
     found = faults(document, Path(__file__).parent)
     assert set(found) == {key}
@@ -378,7 +378,7 @@ values = st.recursive(
 @settings(max_examples=300, deadline=None)
 @given(sections=st.dictionaries(st.sampled_from(sorted(Config.model_fields)) | st.text(max_size=5), values))
 def test_no_document_makes_anything_but_a_config_or_a_config_fault(tmp_path_factory, sections):
-    """Whatever TOML can hold, the answer is a config or the list of its faults."""
+    """Any TOML document gives a config or the list of its faults."""
     for document in (sections, {**MINIMAL, **sections}):
         try:
             config = parse(document, "f", tmp_path_factory.getbasetemp())
@@ -404,7 +404,7 @@ def test_a_laser_line_has_no_range():
     assert "no meaning with a laser line" in found["spectrum"]
 
 
-def test_lights_that_would_share_a_map_are_told():
+def test_lights_that_would_share_a_map_are_reported():
     """10 and 370 degrees of azimuth are one light; a millionth of a degree apart they are two, with two maps."""
     lights = [{"theta_deg": 30, "phi_deg": 10}, {"theta_deg": 30, "phi_deg": 370}]
     assert faults(with_section("render", lights=lights)) == {"render.lights.1": "the same light as render.lights.0"}

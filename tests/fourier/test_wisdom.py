@@ -49,7 +49,7 @@ def is_known(shape: tuple[int, int] = SHAPE) -> bool:
     return True
 
 
-def test_what_was_learned_is_kept(folder: Path) -> None:
+def test_measured_plans_are_stored(folder: Path) -> None:
     assert not is_known()
     expected = transformed()
     assert [path for path in folder.rglob("*") if path.is_file()] == [wisdom.file()]
@@ -62,7 +62,7 @@ def test_what_was_learned_is_kept(folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_second_size_is_learned_beside_the_first() -> None:
+def test_a_second_size_is_added_to_the_first() -> None:
     transformed()
     wisdom._learned.clear()
     transformed((30, 18))
@@ -80,7 +80,7 @@ def test_wisdom_is_in_force_only_while_plans_are_made() -> None:
 
 
 def test_processes_learn_from_each_other(tmp_path: Path) -> None:
-    """Two at once leave a sound file; the next one plans nothing anew."""
+    """Two processes at once leave a valid file, and the next one measures no plan again."""
     script = (
         "import sys; from tests.fourier import test_wisdom as t; shape = int(sys.argv[1]), 22;"
         "known = t.is_known(shape); t.transformed(shape); print(known)"

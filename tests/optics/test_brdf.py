@@ -1,4 +1,4 @@
-"""What multiplies |P|^2: normalisation, reciprocity and the energy a mirror gives back."""
+"""The factors of |P|^2: normalisation, reciprocity and the energy that a mirror reflects."""
 
 import itertools
 

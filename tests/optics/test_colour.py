@@ -55,7 +55,7 @@ def test_black_and_overexposed_white_are_100_apart():
     assert delta_e(np.zeros(3), 1e-3 * WHITE, 7500.0) == pytest.approx(100.0, abs=0.02)
 
 
-def test_clipping_hides_what_both_overexpose():
+def test_clipping_hides_differences_between_overexposed_colours():
     """Two highlights of different brightness look the same once the screen is saturated."""
     assert delta_e(WHITE, 3.0 * WHITE, 7500.0) == 0.0
     assert delta_e(WHITE, 3.0 * WHITE, 0.1) > 10.0

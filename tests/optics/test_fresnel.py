@@ -117,7 +117,7 @@ def test_csv_is_read_linearly_between_samples(tmp_path, text):
     ],
 )
 def test_bad_csv_names_the_file_and_the_line(tmp_path, text, said):
-    """Whoever wrote the CSV is told which line does not fit, and what stands there."""
+    """The error names the line of the CSV that does not fit, and its content."""
     path = write(tmp_path, text)
     with pytest.raises(InputError) as error:
         fresnel.metal_index(path, np.array([400.0]))
@@ -134,7 +134,7 @@ def test_indices_are_not_extrapolated(tmp_path, lambda_nm):
 
 
 @pytest.mark.parametrize("row", ["-1,3", "0,3", "1.5,-3", "1,0"])
-def test_what_is_no_metal_is_refused(tmp_path, row):
+def test_indices_of_no_metal_are_refused(tmp_path, row):
     """n <= 0 and k < 0 have no meaning here; n = 1 with k = 0 reflects nothing and would divide by zero."""
     path = tmp_path / "odd.csv"
     path.write_text(f"lambda_nm,n,k\n300,{row}\n900,{row}\n")

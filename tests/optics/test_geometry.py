@@ -89,7 +89,7 @@ def test_v_cavity_is_a_share(wi, wr):
 
 
 def test_v_cavity_hides_nothing_at_normal_incidence():
-    """Looked at from above, no groove wall stands in the way."""
+    """From above, no wall of a groove hides another."""
     assert geometry.v_cavity(NORMAL, NORMAL) == 1.0
 
 

@@ -41,7 +41,7 @@ def test_a_sampled_rectangle_is_the_sum_over_its_samples(samples: int, duty: flo
 
 
 @pytest.mark.parametrize("samples", [64, 256])
-def test_sampling_errs_by_what_it_is_said_to(samples: int) -> None:
+def test_sampling_errors_have_the_documented_bounds(samples: int) -> None:
     """1 / (3 M^2) of a blaze and 4 / (3 M^2) of a rectangle, approached and not passed by more than orders / M."""
     blaze = gratings.sampled_blaze(ORDERS, S, 0.25, samples) - gratings.blaze(ORDERS, S, 0.25)
     rectangle = gratings.sampled_rectangle(ORDERS, S, 0.12, 0.5, samples) - gratings.rectangle(ORDERS, S, 0.12, 0.5)
@@ -78,7 +78,7 @@ def test_order_zero_is_the_mirror_direction_and_far_orders_do_not_propagate() ->
     assert list(np.arange(-9, 10)[propagates]) == [-5, -4, -3, -2, -1, 0, 1]
 
 
-def test_an_order_takes_what_its_lobe_holds() -> None:
+def test_the_efficiency_of_an_order_is_the_integral_over_its_lobe() -> None:
     """|c|^2 G / w^2 is the integral of the BRDF times cos over a narrow lobe: a mirror's is 1 at every angle."""
     wi = geometry.direction(np.radians([0.0, 30.0, 80.0]), 0.3)
     np.testing.assert_allclose(gratings.efficiency(1.0, wi, gratings.view_of_order(wi, 0, 0.5)), 1.0, atol=1e-12)
@@ -98,7 +98,7 @@ def test_the_mirror_direction_is_order_zero_of_every_period() -> None:
 
 
 @pytest.mark.parametrize("order", [1, 2, -3])
-def test_both_ways_undo_each_other(order: int) -> None:
+def test_period_and_angle_are_inverse(order: int) -> None:
     wavelengths = np.linspace(0.38, 0.78, 9)
     theta = np.radians(20.0)
     phi = viewing_angle(theta, 5.0, wavelengths, order)
@@ -114,7 +114,7 @@ def test_an_order_beyond_the_horizon_has_no_angle() -> None:
 
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, 33.0, 180.0, 270.0])
-def test_order_m_stands_at_minus_m_over_a_along_the_light(azimuth_deg: float) -> None:
+def test_order_m_has_the_frequency_minus_m_over_a_along_the_light(azimuth_deg: float) -> None:
     azimuth = np.radians(azimuth_deg)
     for order in (1, 2):
         phi = viewing_angle(THETA_I, 2.5, 0.55, order)

@@ -46,7 +46,7 @@ def test_round_trip_over_several_chunks(tmp_path, shape):
 
 @pytest.mark.parametrize("order", ["F", "strided"])
 def test_round_trip_of_any_memory_layout(tmp_path, order):
-    """What counts are the indices, not how memory holds them."""
+    """Indices count, not the layout in memory."""
     values = np.arange(60.0).reshape(6, 10)
     values = np.asfortranarray(values) if order == "F" else values[::-2, 1::3]
     save_one(tmp_path / "a.zarr", values)

@@ -18,7 +18,7 @@ json_values = st.recursive(
 
 @given(st.dictionaries(st.text(max_size=4), json_values, max_size=5))
 def test_order_of_keys_does_not_matter(value):
-    """A config's sections may stand in any order."""
+    """The order of a config's sections makes no difference."""
     assert digest.of_json(value) == digest.of_json(dict(reversed(value.items())))
 
 

@@ -55,7 +55,7 @@ def everything(folder):
 # --- made whole or not at all ------------------------------------------------------------------------
 
 
-def test_an_artifact_is_what_was_written(store):
+def test_an_artifact_has_the_files_that_were_written(store):
     """Its record, summary and files come back, with its size; nothing temporary is left."""
     assert not store.has("surface", K1)
     make(store)
@@ -71,14 +71,14 @@ def test_an_artifact_is_what_was_written(store):
 
 
 def test_the_record_can_be_completed_while_writing(store):
-    """What a stage finds out is sealed with the rest."""
+    """The seal covers values that a stage adds to the record."""
     with store.create("table", K1, {"name": "a"}) as (_, record):
         record["summary"] = {"terms": 12}
     assert store.open("table", K1).summary == {"terms": 12}
 
 
 @pytest.mark.parametrize("fault", [ValueError, KeyboardInterrupt, MemoryError])
-def test_a_fault_while_writing_leaves_nothing(store, fault):
+def test_an_error_while_writing_leaves_no_artifact(store, fault):
     """Neither an artifact nor a temporary folder is left, and the fault itself is passed on."""
 
     def fail():
@@ -118,7 +118,7 @@ def test_artifacts_are_readable_as_the_umask_says(store, umask, mode):
 
 
 def test_the_first_of_two_writers_without_a_lock_stays(store):
-    """On machines that share no lock both make it; the second finds it made and leaves it alone."""
+    """Machines without a common lock both make it; the second keeps the artifact of the first."""
     with store.create("surface", K1, RECORDED) as (folder, _):
         (folder / "a.txt").write_text("second")
         make(store, text="first")
@@ -127,7 +127,7 @@ def test_the_first_of_two_writers_without_a_lock_stays(store):
 
 
 def make_once(root, log, coming, count):
-    """What a run does for one step: waits for the lock, makes the artifact unless it stands.
+    """Does what a run does for one step: waits for the lock, and makes the artifact unless it exists.
 
     `coming` is a semaphore that counts who comes for the lock: the maker is not done before all `count` have.
     """
@@ -262,7 +262,7 @@ def age(path, days):
     os.utime(path, (then, then))
 
 
-def test_collect_tells_what_it_freed(store):
+def test_collect_reports_the_freed_bytes(store):
     """The number of folders removed and their bytes; a second time there is nothing."""
     folder = make(store)
     (folder / "a.txt").write_text("another")
@@ -271,7 +271,7 @@ def test_collect_tells_what_it_freed(store):
     assert store.collect(None) == (0, 0)
 
 
-def test_collect_keeps_what_was_used_lately(store):
+def test_collect_keeps_artifacts_that_were_used_recently(store):
     """Age counts from the last use, and only when a number of days is given."""
     for name in ("old", "used", "new"):
         make(store, key_of(name))
@@ -303,7 +303,7 @@ def test_collect_removes_abandoned_folders_only(store):
 
 
 def test_an_empty_store_is_sound(store):
-    """What was never written to has nothing to list, to check or to remove."""
+    """A store that was never written has nothing to list, to check or to remove."""
     assert (store.artifacts(), store.check(), store.collect(1.0)) == ([], [], (0, 0))
     assert not store.root.exists()
 
@@ -339,7 +339,7 @@ def test_a_refusal_anywhere_is_one_storage_fault(store, monkeypatch, where, code
     assert store.check() == []
 
 
-def test_other_system_errors_stay_what_they_are(store, tmp_path):
+def test_other_system_errors_pass_unchanged(store, tmp_path):
     """A file elsewhere that a stage did not find is no fault of the store."""
     with pytest.raises(FileNotFoundError), store.create("surface", K1, RECORDED):
         (tmp_path / "missing").read_text()
@@ -378,7 +378,7 @@ def test_a_full_disk_is_a_storage_fault(small_disk):
 
 
 def test_a_read_only_disk_is_a_storage_fault(small_disk):
-    """What stands can be read; nothing can be made, and that is said in one line."""
+    """Existing artifacts can be read; none can be made, and the error has one line."""
     store = Store(small_disk / "store")
     make(store)
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
@@ -406,7 +406,7 @@ except StorageError as error:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="file size limits are POSIX")
 def test_a_limit_on_file_size_is_a_storage_fault(store):
-    """Where the system cuts files short, the run ends with the code for storage and leaves nothing."""
+    """Where the system limits the size of files, the run ends with the code for storage and leaves no artifact."""
     command = [sys.executable, "-c", LIMITED, str(store.root)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
     assert done.returncode == StorageError.exit_code, done.stderr
@@ -437,7 +437,7 @@ def write_until(root, count):
 
 
 def test_a_killed_writer_leaves_a_clean_store(store):
-    """Killed before any of its changes to the disk, a writer leaves litter: nothing to be seen, no lock held."""
+    """Killed before any of its changes to the disk, a writer leaves temporary files, but no artifact and no lock."""
     seen = set()
     for count in itertools.count(1):
         sound = make(store, K2)

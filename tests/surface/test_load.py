@@ -23,7 +23,7 @@ def load(path: Path, **keys: Any) -> tuple[HeightField, ScanRecord]:
     return load_scan(SurfaceSource(path=str(path), **keys))
 
 
-def told(path: Path, **keys: Any) -> str:
+def message_of(path: Path, **keys: Any) -> str:
     with pytest.raises(InputError) as caught:
         load(path, **keys)
     message = str(caught.value)
@@ -95,12 +95,12 @@ def test_record_is_json_without_folders(text: Path) -> None:
 
 
 def test_every_missing_key_is_named_at_once(npy: Path, png: Path) -> None:
-    assert "set surface.pitch_um" in told(npy)
-    assert "surface.height_unit" in told(npy)
-    assert "surface.pitch_um" not in told(npy, pitch_um=0.1)
-    assert "surface.height_unit" not in told(npy, height_unit="nm")
-    assert "surface.height_range_um" in told(png)
-    assert "surface.pitch_um" in told(png)
+    assert "set surface.pitch_um" in message_of(npy)
+    assert "surface.height_unit" in message_of(npy)
+    assert "surface.pitch_um" not in message_of(npy, pitch_um=0.1)
+    assert "surface.height_unit" not in message_of(npy, height_unit="nm")
+    assert "surface.height_range_um" in message_of(png)
+    assert "surface.pitch_um" in message_of(png)
 
 
 def test_a_repeated_unit_may_agree_to_a_thousandth(text: Path) -> None:
@@ -109,8 +109,8 @@ def test_a_repeated_unit_may_agree_to_a_thousandth(text: Path) -> None:
     assert record.pitch_from == "file"
 
 
-def test_contradictions_name_both_values_and_the_ways_out(text: Path) -> None:
-    pitch, unit = told(text, pitch_um=(0.501, 1.0)), told(text, height_unit="um")
+def test_contradictions_name_both_values_and_the_remedy(text: Path) -> None:
+    pitch, unit = message_of(text, pitch_um=(0.501, 1.0)), message_of(text, height_unit="um")
     assert "0.5 x 1 um in the file" in pitch
     assert "surface.pitch_um = 0.501 x 1" in pitch
     assert "stored in 0.001 um" in unit
@@ -129,8 +129,8 @@ def test_override(tmp_path: Path) -> None:
 
 
 def test_keys_of_the_wrong_kind_of_file(npy: Path, png: Path) -> None:
-    assert "use surface.height_unit instead" in told(npy, pitch_um=0.1, height_range_um=1.0)
-    assert "set surface.height_range_um instead" in told(png, pitch_um=0.1, height_unit="nm")
+    assert "use surface.height_unit instead" in message_of(npy, pitch_um=0.1, height_range_um=1.0)
+    assert "set surface.height_range_um instead" in message_of(png, pitch_um=0.1, height_unit="nm")
 
 
 # --- values ------------------------------------------------------------------------------------------
@@ -142,13 +142,13 @@ def test_holes_are_kept_and_counted(tmp_path: Path) -> None:
     field, record = load(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
     assert record.holes == np.isnan(field.heights_um).sum() == 60
     heights[5, 0] = np.nan
-    assert "61 holes" in told(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
+    assert "61 holes" in message_of(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
 
 
 def test_infinite_is_no_hole(tmp_path: Path) -> None:
     heights = RAMP.copy()
     heights[0, :2] = np.inf, -np.inf
-    assert "2 infinite values" in told(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
+    assert "2 infinite values" in message_of(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
 
 
 @pytest.mark.parametrize(
@@ -164,16 +164,16 @@ def test_infinite_is_no_hole(tmp_path: Path) -> None:
     ],
 )
 def test_refused_values(tmp_path: Path, heights: NDArray[Any], says: str) -> None:
-    assert says in told(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
+    assert says in message_of(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
 
 
 def test_refusals_of_values_come_before_questions_of_units(tmp_path: Path) -> None:
-    assert "NaN everywhere" in told(save(tmp_path, np.full((9, 9), np.nan)))
+    assert "NaN everywhere" in message_of(save(tmp_path, np.full((9, 9), np.nan)))
 
 
 @pytest.mark.parametrize(("unit", "found"), [("m", "1.19e+08 um"), ("mm", "119000 um")])
 def test_mislabelled_heights(npy: Path, unit: str, found: str) -> None:
-    message = told(npy, pitch_um=0.1, height_unit=unit)
+    message = message_of(npy, pitch_um=0.1, height_unit=unit)
     assert f"found {found}" in message
     assert "(from the config)" in message
     assert message.endswith("mislabelled units? set surface.height_unit")
@@ -182,19 +182,19 @@ def test_mislabelled_heights(npy: Path, unit: str, found: str) -> None:
 def test_heights_mislabelled_by_the_file(tmp_path: Path) -> None:
     path = tmp_path / "mislabelled.txt"
     np.savetxt(path, RAMP, header="Width: 6 um\nHeight: 10 um\nValue units: mm")
-    message = told(path)
+    message = message_of(path)
     assert "(from the file)" in message
     assert message.endswith("set surface.height_unit and surface.override_file_units = true")
 
 
 def test_heights_too_small_and_ranges_too_large(tmp_path: Path, png: Path) -> None:
-    assert "found 1.19e-07 um" in told(save(tmp_path, RAMP * 1e-3), pitch_um=0.1, height_unit="pm")
-    assert "set surface.height_range_um" in told(png, pitch_um=0.1, height_range_um=1e6)
+    assert "found 1.19e-07 um" in message_of(save(tmp_path, RAMP * 1e-3), pitch_um=0.1, height_unit="pm")
+    assert "set surface.height_range_um" in message_of(png, pitch_um=0.1, height_range_um=1e6)
 
 
 @pytest.mark.parametrize("pitch", [(0.1, 9e-5), (101.0, 0.1)])
 def test_pitch_out_of_reach(npy: Path, pitch: tuple[float, float]) -> None:
-    assert "mislabelled units? set surface.pitch_um" in told(npy, pitch_um=pitch, height_unit="nm")
+    assert "mislabelled units? set surface.pitch_um" in message_of(npy, pitch_um=pitch, height_unit="nm")
 
 
 def test_a_recipe_is_no_file() -> None:
@@ -220,7 +220,7 @@ def test_gwyddion_file_asks_for_both_units() -> None:
     path = DATA / "scans" / "test.gwy"
     if not path.exists():
         pytest.skip(f"no real scans here: {path} is absent")
-    message = told(path)
+    message = message_of(path)
     assert "surface.pitch_um" in message
     assert "surface.height_unit" in message
     assert load(path, pitch_um=0.1, height_unit="um")[0].shape == (128, 128)
@@ -234,4 +234,4 @@ def test_microscope_file_needs_no_keys() -> None:
     field, record = load(path)
     assert field.size_um == pytest.approx((2.0, 2.0))
     assert (record.pitch_from, record.unit_from, record.um_per_unit) == ("file", "file", 1e-3)
-    assert "0.00390625 x 0.00390625 um in the file" in told(path, pitch_um=0.0039)
+    assert "0.00390625 x 0.00390625 um in the file" in message_of(path, pitch_um=0.0039)

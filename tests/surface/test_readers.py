@@ -1,4 +1,4 @@
-"""Readers: what each real file gives, which way up a hand-made pattern comes, how faults are told."""
+"""Readers: values of real files, the orientation of patterns made for the test, and error messages."""
 
 import struct
 from pathlib import Path
@@ -28,8 +28,8 @@ def real(name: str) -> Path:
     return path
 
 
-def told(path: Path, channel: str | None = None) -> str:
-    """The one line a fault is told in."""
+def message_of(path: Path, channel: str | None = None) -> str:
+    """The error message, which has one line."""
     with pytest.raises(InputError) as caught:
         read_scan(path, channel)
     message = str(caught.value)
@@ -162,7 +162,7 @@ def test_channels_of_length_can_be_chosen_and_others_not() -> None:
     # the way back differs by hysteresis, but lies the same way
     assert 0.8 < alike(trace.heights, retrace.heights) < 0.99
     assert alike(trace.heights, retrace.heights[:, ::-1]) < 0.2
-    assert "'HeightTrace', 'HeightRetrace'" in told(path, "PhaseTrace")
+    assert "'HeightTrace', 'HeightRetrace'" in message_of(path, "PhaseTrace")
     di = real("scans/di-6.di")
     first, second = read_scan(di, None), read_scan(di, "Height #2")
     assert not np.array_equal(first.heights, second.heights)
@@ -193,7 +193,7 @@ def test_park_heights_agree_with_the_preview() -> None:
     assert np.corrcoef(levelled(heights).ravel(), levelled(shown[::-1]).ravel())[0, 1] > 0.95
 
 
-def test_wsxm_integers_and_doubles_lie_the_same_way() -> None:
+def test_wsxm_integers_and_doubles_have_one_orientation() -> None:
     pytest.importorskip("SurfaceTopography.IO", exc_type=ImportError)
     one, other = (read_scan(real(f"scans/{name}"), None).heights for name in ("top-1.top", "stp-1.stp"))
     assert alike(one, other) > 0.99
@@ -247,7 +247,7 @@ def test_npz_by_name_and_alone(tmp_path: Path) -> None:
     np.savez(several, a=HANDED, b=2 * HANDED)
     np.testing.assert_array_equal(read_scan(alone, None).heights, HANDED)
     np.testing.assert_array_equal(read_scan(several, "b").heights, 2 * HANDED)
-    assert "channels 'a', 'b'" in told(several)
+    assert "channels 'a', 'b'" in message_of(several)
 
 
 @pytest.mark.parametrize(
@@ -425,12 +425,12 @@ def test_jpk(tmp_path: Path, reflect: int, first: NDArray[np.float64]) -> None:
     ],
 )
 def test_bad_file(name: str, says: str) -> None:
-    assert says in told(real(f"bad/{name}"))
+    assert says in message_of(real(f"bad/{name}"))
 
 
 def test_truncated_nanoscope_file() -> None:
     pytest.importorskip("SurfaceTopography.IO", exc_type=ImportError)
-    assert "not large enough" in told(real("bad/di_corrupted.di"))
+    assert "not large enough" in message_of(real("bad/di_corrupted.di"))
 
 
 @pytest.mark.parametrize(
@@ -442,14 +442,14 @@ def test_truncated_microscope_file(tmp_path: Path, name: str, kept: float) -> No
     data = real(f"scans/{name}").read_bytes()
     path = tmp_path / name
     path.write_bytes(data[: int(len(data) * kept)])
-    told(path)
+    message_of(path)
 
 
 def test_truncated_gwy(tmp_path: Path) -> None:
     pytest.importorskip("gwyfile")
     path = tmp_path / "cut.gwy"
     path.write_bytes(real("scans/test.gwy").read_bytes()[:60000])
-    assert "gwyfile cannot read" in told(path)
+    assert "gwyfile cannot read" in message_of(path)
 
 
 def test_truncated_sxm(tmp_path: Path) -> None:
@@ -457,7 +457,7 @@ def test_truncated_sxm(tmp_path: Path) -> None:
     path = tmp_path / "cut.sxm"
     write_sxm(path, "up", HANDED, HANDED)
     path.write_bytes(path.read_bytes()[:-40])
-    assert "nanonispy2 cannot read" in told(path)
+    assert "nanonispy2 cannot read" in message_of(path)
 
 
 def test_truncated_png(tmp_path: Path) -> None:
@@ -466,14 +466,14 @@ def test_truncated_png(tmp_path: Path) -> None:
     Image.fromarray(noise).save(path)
     for kept in (12, 900):
         path.write_bytes(path.read_bytes()[:kept])
-        told(path)
+        message_of(path)
 
 
 def test_missing_extra_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "gwyfile", None)
     path = tmp_path / "some.gwy"
     path.write_bytes(b"GWYPGwyContainer\0\0\0\0\0")
-    assert "pip install 'diffract-bake[readers]'" in told(path)
+    assert "pip install 'diffract-bake[readers]'" in message_of(path)
 
 
 def test_content_decides_not_the_suffix(tmp_path: Path) -> None:
@@ -485,18 +485,18 @@ def test_content_decides_not_the_suffix(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_scan(array, None).heights, HANDED)
 
 
-def test_text_under_an_image_suffix_is_told_so(tmp_path: Path) -> None:
+def test_text_under_an_image_suffix_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "matrix.png"
     np.savetxt(path, TOP_FIRST)
-    assert "found plain text" in told(path)
+    assert "found plain text" in message_of(path)
 
 
 def test_no_such_file_a_folder_and_an_empty_file(tmp_path: Path) -> None:
     empty = tmp_path / "empty.txt"
     empty.touch()
-    assert "No such file" in told(tmp_path / "absent.png")
-    assert "directory" in told(tmp_path)
-    assert "an empty file" in told(empty)
+    assert "No such file" in message_of(tmp_path / "absent.png")
+    assert "directory" in message_of(tmp_path)
+    assert "an empty file" in message_of(empty)
 
 
 @pytest.mark.parametrize(
@@ -519,14 +519,14 @@ def test_no_such_file_a_folder_and_an_empty_file(tmp_path: Path) -> None:
 def test_unreadable_content(tmp_path: Path, content: bytes, says: str) -> None:
     path = tmp_path / "scan.dat"
     path.write_bytes(content)
-    assert says in told(path)
+    assert says in message_of(path)
 
 
 @pytest.mark.parametrize(("header", "says"), [("# Value units: V", "values in 'V'"), ("# Width: 3 V", "3 V")])
 def test_text_in_other_units(tmp_path: Path, header: str, says: str) -> None:
     path = tmp_path / "other.txt"
     np.savetxt(path, TOP_FIRST, header=f"{header[2:]}\nHeight: 3 um")
-    assert says in told(path)
+    assert says in message_of(path)
 
 
 def test_images_that_would_lie(tmp_path: Path) -> None:
@@ -539,9 +539,9 @@ def test_images_that_would_lie(tmp_path: Path) -> None:
     Image.fromarray(rgb).save(faint)
     page = Image.fromarray(TOP_FIRST.astype(np.uint8))
     page.save(pages, save_all=True, append_images=[page])
-    assert "(R = G = B), found 1 coloured" in told(coloured)
-    assert "transparent" in told(faint)
-    assert "2 pages" in told(pages)
+    assert "(R = G = B), found 1 coloured" in message_of(coloured)
+    assert "transparent" in message_of(faint)
+    assert "2 pages" in message_of(pages)
 
 
 def test_16_bit_colour_png_is_refused(tmp_path: Path) -> None:
@@ -556,7 +556,7 @@ def test_16_bit_colour_png_is_refused(tmp_path: Path) -> None:
     header = struct.pack(">IIBBBBB", 12, 10, 16, 2, 0, 0, 0)
     parts = (chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(pixels)), chunk(b"IEND", b""))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
-    assert "16-bit colour" in told(path)
+    assert "16-bit colour" in message_of(path)
 
 
 def test_arrays_that_are_no_height_map(tmp_path: Path) -> None:
@@ -570,15 +570,15 @@ def test_arrays_that_are_no_height_map(tmp_path: Path) -> None:
         (np.full((9, 9), "a"), "<U1"),
     ):
         np.save(path, array)
-        assert says in told(path)
+        assert says in message_of(path)
     np.save(path, np.full((9, 9), None), allow_pickle=True)
-    told(path)
+    message_of(path)
 
 
 def test_a_claimed_size_costs_no_memory(tmp_path: Path) -> None:
     path = tmp_path / "wide.npy"
     np.save(path, np.zeros((8, 8193), np.int8))
-    assert "at most 8192" in told(path)
+    assert "at most 8192" in message_of(path)
 
 
 def test_zip_that_holds_no_arrays(tmp_path: Path) -> None:
@@ -587,13 +587,13 @@ def test_zip_that_holds_no_arrays(tmp_path: Path) -> None:
     path = tmp_path / "book.npz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("sheet.xml", "<x/>")
-    assert "a zip of sheet.xml" in told(path)
+    assert "a zip of sheet.xml" in message_of(path)
 
 
 def test_wanted_channel_that_is_not_there(tmp_path: Path) -> None:
     path = tmp_path / "grey.png"
     Image.fromarray(TOP_FIRST.astype(np.uint8)).save(path)
-    assert "only 'grey'" in told(path, "Height")
+    assert "only 'grey'" in message_of(path, "Height")
 
 
 def test_units_of_length() -> None:

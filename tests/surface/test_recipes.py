@@ -273,6 +273,6 @@ def test_elaphe_fingers_point_to_positive_y() -> None:
         ("correlation_um", {"kind": "gaussian", "correlation_um": (1.0, 70.0)}),
     ],
 )
-def test_what_samples_cannot_carry_is_refused_by_key(key: str, recipe: dict[str, Any]) -> None:
+def test_structure_beyond_the_nyquist_limit_is_refused_by_key(key: str, recipe: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=rf"^recipe {recipe['kind']}: surface\.recipe\.{key}: expected "):
         make(ADAPTER.validate_python(recipe))
