@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 COLUMNS, AT_ONCE = "theta_i,phi_i,theta_r,phi_r", 16384  # directions at once, to bound memory
 
 
-class Bundle:
+class BundleTables:
     """A bundle in memory: XYZ = C cos(ti) times what its table holds at (u, v, w) = -wi - wr."""
 
     def __init__(self, folder: Path) -> None:
         self.manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         images = sorted(self.manifest["tables"], key=lambda entry: int(entry["index"]))
         planes = [read_rgba(folder / entry["file"]) for entry in images]
-        layout = {"taylor": TaylorTable, "polar": PolarTable}[self.manifest["grid"]["layout"]]
+        layout = {"taylor": TaylorTextures, "polar": PolarTextures}[self.manifest["grid"]["layout"]]
         self.table = layout(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
     def xyz(self, wi: Array, wr: Array) -> Array:
@@ -62,7 +62,7 @@ class Bundle:
         return np.asarray(0.5 * (np.abs(r_s) ** 2 + np.abs(r_p) ** 2) @ np.array(samples["luminous_weight"]))
 
 
-class PolarTable:
+class PolarTextures:
     """Cubic B-splines on rings and azimuths, Chebyshev polynomials in |w|; texels (ring, azimuth, output)."""
 
     def __init__(self, grid: dict[str, Any], planes: list[NDArray[Any]], scale: list[list[float]]) -> None:
@@ -110,7 +110,7 @@ def spline(t: Array) -> Array:
     return np.stack([s**3, 4.0 - 3.0 * t**2 * (2.0 - t), 4.0 - 3.0 * s**2 * (2.0 - s), t**3]) / 6.0
 
 
-class TaylorTable:
+class TaylorTextures:
     """I_p on a grid of (u, v), bilinear between texels; i_p is (v, u, channel, p), computed is (v, u)."""
 
     def __init__(self, grid: dict[str, Any], planes: list[NDArray[Any]], scale: list[float]) -> None:
@@ -179,7 +179,7 @@ if __name__ == "__main__":
         sys.exit("usage: python evaluate.py directions.csv")
     try:
         angles = read_directions(Path(sys.argv[1]).read_text(encoding="utf-8-sig"))
-        found = Bundle(Path(__file__).parent).xyz(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
+        found = BundleTables(Path(__file__).parent).xyz(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
     except (OSError, ValueError) as error:
         sys.exit(f"{sys.argv[1]}: {error}")
     print("X,Y,Z", *(",".join(f"{value:.12g}" for value in values) for values in found), sep="\n")

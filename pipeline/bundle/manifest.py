@@ -64,7 +64,7 @@ class MapImage(Image):
 # --- grids ---------------------------------------------------------------------------------------------
 
 
-class TaylorGrid(Validated):
+class TaylorGridEntry(Validated):
     """Where the texels of a Taylor table stand in (u, v)."""
 
     layout: Literal["taylor"]
@@ -82,7 +82,7 @@ class TaylorGrid(Validated):
     )
 
 
-class PolarGrid(Validated):
+class PolarGridEntry(Validated):
     """Where the texels of a polar table stand in (u, v), and what is made of them.
 
     basis: (outputs, 3, w_terms); None where every output is a term of its own.
@@ -129,7 +129,7 @@ class PolarGrid(Validated):
     )
 
 
-Grid = Annotated[TaylorGrid | PolarGrid, Field(discriminator="layout")]
+Grid = Annotated[TaylorGridEntry | PolarGridEntry, Field(discriminator="layout")]
 
 # --- errors --------------------------------------------------------------------------------------------
 

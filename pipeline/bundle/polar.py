@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
 from pipeline.bundle import polar_storage
-from pipeline.bundle.manifest import PolarGrid, PolarImage
+from pipeline.bundle.manifest import PolarGridEntry, PolarImage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
@@ -71,11 +71,11 @@ def prepare(
     )
 
 
-def grid_entry(textures: Textures) -> PolarGrid:
+def grid_entry(textures: Textures) -> PolarGridEntry:
     """Where the texels of textures stand and what is made of them."""
     rings, azimuths = textures.grid.rings, textures.grid.azimuths
     outputs, _, terms = textures.basis.shape
-    return PolarGrid(
+    return PolarGridEntry(
         layout="polar",
         width=azimuths.count,
         height=rings.count,

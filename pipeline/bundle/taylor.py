@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from pipeline.accuracy.certificate import Certificate
 from pipeline.arrays import Array
 from pipeline.bundle import taylor_storage
-from pipeline.bundle.manifest import TaylorGrid, TaylorImage, TaylorLoss
+from pipeline.bundle.manifest import TaylorGridEntry, TaylorImage, TaylorLoss
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
 from pipeline.report import images
@@ -33,7 +33,7 @@ def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificat
     scale = taylor_storage.scales(table, config.publish.precision)
     # measured first: it may refuse
     loss = taylor_storage.measure(config, table, scale) if config.publish.precision == "half" else None
-    entry = TaylorGrid(
+    entry = TaylorGridEntry(
         layout="taylor", width=table.resolution, height=table.resolution, power=table.power, u_max=grid.U_MAX
     )
     return Prepared(

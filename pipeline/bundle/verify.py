@@ -7,26 +7,26 @@ from pydantic import ValidationError
 
 from pipeline.bundle import checksums
 from pipeline.bundle.checksums import SUMS
-from pipeline.bundle.manifest import MANIFEST, Image, Manifest, PolarGrid
+from pipeline.bundle.manifest import MANIFEST, Image, Manifest, PolarGridEntry
 from pipeline.errors import DamagedError
 from pipeline.report import images
 from pipeline.store import digest
 
 if TYPE_CHECKING:
-    from pipeline.bundle.evaluator import Bundle
+    from pipeline.bundle.evaluator import BundleTables
 
 
-def open_bundle(folder: Path) -> "Bundle":
+def open_bundle(folder: Path) -> "BundleTables":
     """Read a bundle into memory. Raises DamagedError if it has faults.
 
     The code that runs is this project's evaluator, never the bundle's copy.
     """
-    from pipeline.bundle.evaluator import Bundle
+    from pipeline.bundle.evaluator import BundleTables
 
     faults = verify(folder)
     if faults:
         raise DamagedError(f"{folder}: {summary(faults)}. Fetch the bundle again, or publish it again")
-    return Bundle(folder)
+    return BundleTables(folder)
 
 
 def verify(folder: Path) -> list[str]:
@@ -99,7 +99,7 @@ def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
         faults.append(f"{MANIFEST}: is of {called}, but the folder is named {folder.resolve().name}")
     if [table.index for table in manifest.tables] != list(range(len(manifest.tables))):
         faults.append(f"{MANIFEST}: tables: expected index = 0, 1, ... in order")
-    if isinstance(manifest.grid, PolarGrid) and not _basis_fits(manifest.grid, len(manifest.tables)):
+    if isinstance(manifest.grid, PolarGridEntry) and not _basis_fits(manifest.grid, len(manifest.tables)):
         faults.append(f"{MANIFEST}: grid: {len(manifest.tables)} tables do not hold what basis and w_terms ask for")
     for table in manifest.tables:
         if table.layout != manifest.grid.layout:
@@ -111,7 +111,7 @@ def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
     return faults
 
 
-def _basis_fits(grid: PolarGrid, images: int) -> bool:
+def _basis_fits(grid: PolarGridEntry, images: int) -> bool:
     """Whether the basis is (outputs, 3, w_terms) for the outputs that the images hold."""
     if grid.basis is None:
         return 4 * images == 3 * grid.w_terms

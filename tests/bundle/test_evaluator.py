@@ -15,8 +15,7 @@ from pipeline.bundle import evaluator, material
 from pipeline.bundle.polar import grid_entry
 from pipeline.bundle.verify import open_bundle
 from pipeline.config.models import Config
-from pipeline.diffraction.polar_grid import Azimuths, Rings
-from pipeline.diffraction.polar_grid import PolarGrid as TableGrid
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.optics import brdf, geometry
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
@@ -71,14 +70,14 @@ def test_a_table_without_symmetry_is_looked_up_alike() -> None:
     """Noise, turned and stretched: every rule of the grid shows, at its origin and at its rim too."""
     rng = np.random.default_rng(5)
     values = rng.normal(size=(24, 3, 4, 96)).astype(np.float32)
-    table = PolarTable(values, TableGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4)))
+    table = PolarTable(values, PolarGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4)))
     rho, phi = 2.0 * np.sqrt(rng.random(5000)), 2.0 * np.pi * rng.random(5000)
     rho[:500], rho[500:1000] = 0.1 * rng.random(500), 2.0 - 0.1 * rng.random(500)
     w = -np.sqrt(4.0 - rho**2) * rng.random(5000)
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), w])
     textures = whole(table)
     planes = [np.moveaxis(textures.values[:, 4 * q : 4 * q + 4], 1, -1) for q in range(textures.count)]
-    page = evaluator.PolarTable(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
+    page = evaluator.PolarTextures(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
     np.testing.assert_allclose(page.value(*uvw), table.look_up(uvw.T), atol=2e-4)
 
 

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import polar_storage
-from pipeline.bundle.manifest import Manifest, PolarGrid, PolarLoss
+from pipeline.bundle.manifest import Manifest, PolarGridEntry, PolarLoss
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, ConfigError
@@ -39,8 +39,8 @@ def published_with(bake: Baker, out: Path, **keys: Any) -> tuple[Path, Manifest]
     return folder, manifest_of(folder)
 
 
-def grid_of(told: Manifest) -> PolarGrid:
-    assert isinstance(told.grid, PolarGrid)
+def grid_of(told: Manifest) -> PolarGridEntry:
+    assert isinstance(told.grid, PolarGridEntry)
     return told.grid
 
 

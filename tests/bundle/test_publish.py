@@ -14,7 +14,7 @@ import pytest
 
 from pipeline.accuracy import scalar_domain
 from pipeline.bundle import checksums
-from pipeline.bundle.manifest import Manifest, TaylorGrid
+from pipeline.bundle.manifest import Manifest, TaylorGridEntry
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
 from pipeline.report import images
@@ -66,7 +66,7 @@ def test_texels_are_the_table(bake: Baker, bundle: Path) -> None:
 
 def test_the_mapping_told_is_the_grids(bundle: Path) -> None:
     told = manifest_of(bundle).grid
-    assert isinstance(told, TaylorGrid)
+    assert isinstance(told, TaylorGridEntry)
     t = 2.0 * np.arange(told.width) / (told.width - 1) - 1.0
     u = told.u_max * np.abs(t) ** told.power * np.sign(t)
     np.testing.assert_allclose(u, grid.nodes(told.width, told.power), rtol=1e-14, atol=1e-15)
