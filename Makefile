@@ -7,7 +7,7 @@ BAKE := $(VENV)/bin/diffract-bake
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint format clean
+.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -19,6 +19,8 @@ help:
 	@echo "make test-avx2               run the kernels' tests and two bakes as on a processor without AVX-512"
 	@echo "make lint                    run ruff and mypy"
 	@echo "make format                  fix and format the code with ruff"
+	@echo "make coverage                lines and branches that the fast tests run"
+	@echo "make profile CONFIG=...      where a warm bake of a config spends its time"
 	@echo "make setup                   set up, and do nothing else"
 	@echo "make clean                   remove the environment and $(OUT)"
 
@@ -100,6 +102,20 @@ AVX2_TESTS := tests/physics tests/cli/test_device.py tests/cli/test_polar.py tes
 test-avx2: setup
 	cache="$$(mktemp -d)" && trap 'rm -rf "$$cache"' EXIT && \
 		POCL_KERNELLIB_NAME=avx2 POCL_LLVM_CPU_NAME=haswell XDG_CACHE_HOME="$$cache" $(VENV)/bin/python -m pytest $(AVX2_TESTS)
+
+# lines and branches that the fast tests run; commands in child processes are not counted
+coverage: setup glslang
+	$(VENV)/bin/coverage run -m pytest -m "not slow"
+	$(VENV)/bin/coverage report
+
+# where a warm bake spends its time: the first run compiles kernels, the second is profiled in a store of its own
+CONFIG_PROFILED := $(or $(CONFIG),configs/elaphe.toml)
+profile: setup
+	store="$$(mktemp -d)" && trap 'rm -rf "$$store"' EXIT && \
+		$(BAKE) run $(CONFIG_PROFILED) --until table --store "$$store/warm" && \
+		$(VENV)/bin/python -c "import cProfile; from cli.main import cli; \
+			cProfile.run('cli(standalone_mode=False)', sort='cumulative')" \
+			run $(CONFIG_PROFILED) --until table --store "$$store/cold" | head -n 60
 
 clean:
 	rm -rf $(VENV) $(OUT) *.egg-info
