@@ -55,4 +55,4 @@ def place(artifact: Artifact, out: Path) -> Path:
 def stage_of(layout: Layout) -> Stage:
     """The bundle of a layout: its manifest tells of every stage before."""
     inputs = ("surface", layout.transform.name, "table", "render", "validate")
-    return Stage("bundle", 1, inputs, _parameters, _produce, uses_device=True)
+    return Stage("bundle", 1, inputs, _parameters, _produce)
