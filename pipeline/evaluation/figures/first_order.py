@@ -124,7 +124,7 @@ class Powers:
         self._made: dict[tuple[str, float | str], Power] = {}
 
     def of(self, name: str, field: HeightField, sigma_um: float) -> Power:
-        """Return the power of a field under a window; a name stands for one field."""
+        """Return the power of a field under a window; each name must belong to one field."""
         key = (name, sigma_um)
         if key not in self._made:
             self._made[key] = Reference(field, sigma_um, RANGE_NM[0]).power

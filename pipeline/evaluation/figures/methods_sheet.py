@@ -26,7 +26,7 @@ from pipeline.tables.evaluate import Map
 
 _COMPARED = [name for name in METHODS if name != EXACT]
 _COLUMNS = 5
-# a grating's light stays within so many widths of its line
+# a grating's light stays within this many widths of its line
 _STRIP_WIDTHS = 4.0
 _FLSS_ERROR = 1e-3
 _WHITE_WITHIN, _EXACT_BELOW = 1e-6, 0.9

@@ -40,7 +40,7 @@ _LAMBDA_NM, _FEWER_NM = np.linspace(400.0, 760.0, 10), np.array([400.0, 560.0, 7
 _ORDERS = np.arange(-12.0, 13.0)
 _SAMPLES = (32, 64, 128, 256, 512)
 # drawn: of the lights, and of the orders
-_SHOWN, _SHOWN_ORDERS = (0, 2), (-2, -1, 0, 1, 2)
+_SHOWN, _SHOWN_ORDERS = (0, 2), (0, 1, 2, -1, -2)
 
 # |c_m|^2 of orders at s, 1/um
 Power = Callable[[Array, Array], Array]

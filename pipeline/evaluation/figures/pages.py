@@ -37,8 +37,8 @@ class Made:
     seconds: float
 
 
-def make_all(bench: Bench, progress: Progress, tell: Callable[[str], None]) -> Iterator[Made]:
-    """Make every page, one after the other; `tell` takes a line about each."""
+def make_all(bench: Bench, progress: Progress, note: Callable[[str], None]) -> Iterator[Made]:
+    """Make every page, one after the other; `note` is called with a line about each."""
     for name in PAGES:
         started = time.perf_counter()
         try:
@@ -46,7 +46,7 @@ def make_all(bench: Bench, progress: Progress, tell: Callable[[str], None]) -> I
         except BakeError as error:
             page = _not_made(name, error)
         made = Made(page, time.perf_counter() - started)
-        tell(f"  {name:<20} {made.seconds:5.1f} s")
+        note(f"  {name:<20} {made.seconds:5.1f} s")
         yield made
 
 

@@ -230,8 +230,8 @@ def _pictures(truth: Array, images: Mapping[str, Array], bands: Mapping[str, Ban
     sheet = screen_plots.sheet(truth, shown, screen.side_mm, dim, bright)
     upwards = screen.axis_mm()[::-1]
     series = [
-        Series(_NAMES.get(name, name), upwards, bands[name].profile, colour, "-")
-        for name, colour in zip((EXACT, OURS, PAPER, STAM, STAM_DISC), (COLOURS[-1], *COLOURS), strict=False)
+        Series(_NAMES.get(name, name), upwards, bands[name].profile, colour, ":" if name == EXACT else "-")
+        for name, colour in zip((OURS, PAPER, STAM, STAM_DISC, EXACT), (*COLOURS[:4], COLOURS[-1]), strict=True)
     ]
     rows = Chart("Rows of the screen", "y on the screen (mm)", "mean Y of the row under 1 RU", series, floor=0.0)
     return [

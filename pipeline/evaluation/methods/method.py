@@ -29,7 +29,7 @@ class Method(Protocol):
     def stored_bytes(self) -> int: ...
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         ...
 
 
@@ -38,7 +38,7 @@ class Monochromatic(Method, Protocol):
     """A method that answers for single wavelengths as well."""
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the Nyquist limits."""
+        """Return |P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the Nyquist limits."""
         ...
 
 

@@ -26,7 +26,7 @@ class Panel:
 
 
 def sheet(rows: Sequence[Sequence[Panel]], heading: str, row_names: Sequence[str] = ()) -> bytes:
-    """Maps of equal size on black, row by row, under a heading; `row_names` stand beside the rows. PNG."""
+    """Draw maps of equal size on black, row by row, under a heading; `row_names` to their left. PNG."""
     left = _LEFT_IN if row_names else _GAP_IN
     words = [_TITLE_IN if any(panel.title for panel in row) else _NOTE_IN for row in rows]
     width = left + max(len(row) for row in rows) * (_CELL_IN + _GAP_IN)
@@ -47,7 +47,7 @@ def sheet(rows: Sequence[Sequence[Panel]], heading: str, row_names: Sequence[str
 
 
 def _draw_map(axes: Any, panel: Panel) -> None:
-    """The map in the unit disc, its rim drawn, its words above."""
+    """The map in the unit disc, its rim drawn, its titles above."""
     axes.imshow(panel.pixels, extent=(-1, 1, -1, 1), interpolation="antialiased")
     axes.add_patch(Circle((0, 0), 1.0, fill=False, color="#4a4a4a", linewidth=0.6))
     axes.set(xlim=(-1.01, 1.01), ylim=(-1.01, 1.01))
@@ -58,7 +58,7 @@ def _draw_map(axes: Any, panel: Panel) -> None:
 
 @dataclass(frozen=True)
 class Cost:
-    """One way to a map: seconds of the map alone and with its preparation, its mean error, and its colour."""
+    """A method's cost: seconds of the map alone and with its preparation, its mean error, and its colour."""
 
     name: str
     map_s: float
@@ -68,7 +68,7 @@ class Cost:
 
 
 def costs(points: Sequence[Cost], error_label: str, title: str, reference: tuple[float, str]) -> bytes:
-    """Time against error, PNG: filled with preparation, hollow without.
+    """Draw time against error, PNG: filled with preparation, hollow without.
 
     reference: seconds and name of what has no error, a vertical line.
     """
@@ -107,7 +107,7 @@ def costs(points: Sequence[Cost], error_label: str, title: str, reference: tuple
 
 
 def _free(placed: Sequence[tuple[float, float]], point: Cost) -> tuple[float, float]:
-    """Where a label may stand, as powers of ten: right of its point, above labels that stand there already."""
+    """Position of a label, as powers of ten: right of its point, above labels that are there already."""
     x, y = np.log10(point.total_s) + 0.06, np.log10(point.error)
     while any(abs(x - other_x) < 1.0 and abs(y - other_y) < 0.13 for other_x, other_y in placed):
         y += 0.14

@@ -15,7 +15,7 @@ _ERRORS = (0.01, 100.0)
 
 
 def sheet(truth: Array, images: Mapping[str, Array], side_mm: float, dim_ru: float, bright_ru: float) -> bytes:
-    """XYZ images (pixels, pixels, 3) at two exposures beside the exact one, and their errors at the brighter."""
+    """Draw XYZ images (pixels, pixels, 3) and the exact one at two exposures, with errors at the brighter; PNG."""
     columns = {"exact": truth, **images}
     figure = Figure(figsize=(2.75 * len(columns), 8.4), layout="constrained")
     panels = figure.subplots(3, len(columns), sharex=True, sharey=True)

@@ -71,7 +71,7 @@ def test_light_and_view_may_be_exchanged(method) -> None:
 
 
 def test_asymmetry_sees_a_brdf_that_is_not_reciprocal() -> None:
-    """Radiance itself holds cos(ti) beside the BRDF."""
+    """Radiance itself holds cos(ti) as a factor of the BRDF."""
 
     class Lambertian:
         source, stored_bytes = "a diffuse surface lit by radiance, not irradiance", 0

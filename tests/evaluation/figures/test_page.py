@@ -42,7 +42,7 @@ def test_a_pages_document_is_json_without_infinities() -> None:
 
 
 def test_sources_are_those_of_the_references() -> None:
-    """Tag and title stand in docs/references.md."""
+    """Tag and title are those of docs/references.md."""
     references = " ".join((ROOT / "docs" / "references.md").read_text(encoding="utf-8").split())
     for tag, work in SOURCES.items():
         entry = references[references.index(f"**{tag}**") :]

@@ -110,7 +110,7 @@ def test_bands_rise_again_outwards() -> None:
     falling = np.exp(-np.abs(axis) / 20.0)
     flat = screen_bands(np.tile(falling[:, None], (1, 101)), axis)
     assert (flat.contrast, flat.share) == (0.0, 0.0)
-    # a band of three times the light where it stands, on one side
+    # a band of three times the light at its place, on one side
     banded = falling.copy()
     banded[np.argmin(np.abs(axis - 40.0))] *= 3.0
     found = screen_bands(np.tile(banded[:, None], (1, 101)), axis)

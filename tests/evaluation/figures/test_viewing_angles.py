@@ -29,7 +29,7 @@ FROM_MINUS_X = Plane(THETA_I, np.pi)
 
 @pytest.fixture(scope="module")
 def blazed() -> HeightField:
-    """25 samples a period: nothing folds back beside the first order."""
+    """25 samples a period: nothing folds back next to the first order."""
     return recipes.make(Blazed(kind="blazed", size_um=(65.0, 65.0), pitch_um=(0.1, 1.0)))
 
 
