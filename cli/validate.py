@@ -57,7 +57,7 @@ def validate_command(
 
 def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root: Path | None, as_json: bool) -> None:
     from pipeline.evaluation.figures import pages
-    from pipeline.evaluation.figures.figure import Bench
+    from pipeline.evaluation.figures.page import Bench
     from pipeline.store import scratch
 
     scratch.require_folder(folder)
@@ -76,22 +76,22 @@ def _bench(roles: dict[str, Path | None], quick: bool, folder: Path, store_root:
 
 def _tell(made: list[Any]) -> None:
     """A row a page, then every statement that does not hold."""
-    verdicts = [[check.verdict for check in page.figure.checks] for page in made]
+    verdicts = [[check.verdict for check in each.page.checks] for each in made]
     console.print_table(
-        ["page", "holds", "misses", "told", "time"],
+        ["page", "holds", "misses", "reported", "time"],
         [
             [
-                page.figure.name,
-                *(str(found.count(word)) for word in ("holds", "MISSES", "told")),
-                f"{page.seconds:.0f} s",
+                each.page.name,
+                *(str(found.count(word)) for word in ("holds", "misses", "reported")),
+                f"{each.seconds:.0f} s",
             ]
-            for page, found in zip(made, verdicts, strict=True)
+            for each, found in zip(made, verdicts, strict=True)
         ],
     )
-    for page in made:
-        for check in page.figure.checks:
-            if check.holds is False:
-                click.echo(f"{page.figure.name}: {check.what}: expected {check.expected}, measured {check.measured}")
+    for each in made:
+        for check in each.page.checks:
+            if check.verdict == "misses":
+                click.echo(f"{each.page.name}: {check.what}: expected {check.expected}, measured {check.measured}")
 
 
 def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def _configs(roles: dict[str, Path | None]) -> dict[str, Any]:
 def _surface(role: str, config: Any, store: Any) -> Any:
     """A surface of the bench. Raises InputError for a flat one."""
     from pipeline.errors import InputError
-    from pipeline.evaluation.figures.figure import Surface
+    from pipeline.evaluation.figures.page import BenchSurface
     from pipeline.stages import run, surface
 
     console.note(f"{config.name}:")
@@ -130,7 +130,7 @@ def _surface(role: str, config: Any, store: Any) -> Any:
     field = surface.load(store.open("surface", made["surface"].key))
     if field.half_range_um == 0.0:
         raise InputError(f"{config.name}: expected a surface with a relief for --{role}, got a flat one")
-    return Surface(config, field, config.surface.recipe is None)
+    return BenchSurface(config, field, config.surface.recipe is None)
 
 
 def _write(made: list[Any], folder: Path) -> list[Path]:
@@ -144,7 +144,7 @@ def _write(made: list[Any], folder: Path) -> list[Path]:
 
     contents = {
         "index.html": figure_pages.index(made),
-        **{f"{page.figure.name}.html": figure_pages.page(page.figure) for page in made},
+        **{f"{each.page.name}.html": figure_pages.page(each.page) for each in made},
         "validation.json": json.dumps(pages.document(made), indent=1) + "\n",
     }
     with writing(folder), scratch.replacing(folder) as beside:

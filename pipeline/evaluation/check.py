@@ -6,6 +6,7 @@ from typing import Any, Literal
 Relation = Literal["<=", "<", ">=", ">", "="]
 Verdict = Literal["holds", "misses", "reported", "not measured"]
 
+_DIGITS, _MOST_DIGITS = 4, 10
 _SIGNS: dict[Relation, str] = {"<=": "≤ ", "<": "< ", ">=": "≥ ", ">": "> ", "=": ""}
 
 
@@ -58,12 +59,20 @@ class Check:
         if self.bound is None:
             return ""
         spread = "" if self.tolerance is None else f" ± {self.tolerance:.3g}"
-        return f"{_SIGNS[self.relation]}{self.bound:.4g}{spread} {self.unit}".rstrip()
+        return f"{_SIGNS[self.relation]}{self.bound:.{self._digits}g}{spread} {self.unit}".rstrip()
 
     @property
     def measured(self) -> str:
         """The value as text."""
-        return "" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
+        return "" if self.value is None else f"{self.value:.{self._digits}g} {self.unit}".rstrip()
+
+    @property
+    def _digits(self) -> int:
+        """Significant digits of both texts: four, or as many as tell the value from its bound."""
+        if self.value is None or self.bound is None:
+            return _DIGITS
+        apart = (n for n in range(_DIGITS, _MOST_DIGITS) if f"{self.value:.{n}g}" != f"{self.bound:.{n}g}")
+        return next(apart, _DIGITS)
 
     def document(self) -> dict[str, Any]:
         """All of it, with the verdict, for JSON."""

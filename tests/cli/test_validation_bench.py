@@ -9,8 +9,9 @@ import pytest
 
 from pipeline.accuracy.plots import png
 from pipeline.errors import AccuracyError
+from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import pages
-from pipeline.evaluation.figures.figure import Bench, Check, Figure, Picture, Table
+from pipeline.evaluation.figures.page import Bench, Column, Page, PageTable, Picture
 from tests.cli.tool import REPOSITORY, Tool, recipe, too_wide
 
 
@@ -26,9 +27,6 @@ class Links(HTMLParser):
             self.found += [value for name, value in attrs if name == "href" and value]
 
 
-NUMBERS = {"deep": [{"at": (np.float64(1.5), np.arange(2))}], 3: np.bool_(True)}
-
-
 def picture() -> bytes:
     from matplotlib.figure import Figure as Drawing
 
@@ -37,16 +35,15 @@ def picture() -> bytes:
     return png(drawing)
 
 
-def first(bench: Bench, _progress: object) -> Figure:
+def first(bench: Bench, _progress: object) -> Page:
     checks = [
-        Check("samples", "> 0", str(bench.elaphe.field.shape), np.all(bench.elaphe.field.heights_um < 1e3)),
-        Check("a <tag> & more", "1", "2", False),
-        Check("published", "39", "40", None),
+        Check("samples", "samples", bench.elaphe.field.heights_um.size, ">", 0),
+        Check("tag", "a <tag> & more", 2, "<", 1, source="closed form"),
+        Check("published", "published", 40, "=", 39),
     ]
-    table = Table("Rows", ("a", "b"), [("1", "2")])
-    return Figure(
-        "first", "First", "[D14] fig. 1", "all well", checks, [table], [Picture(picture(), "a line")], numbers=NUMBERS
-    )
+    rows = [("1", np.float64(1.25), (np.float32(0.5), np.inf))]
+    table = PageTable("rows", "Rows", (Column("a"), Column("b", "{:.1f}"), Column("c", "{:g} to {:g}")), rows)
+    return Page("first", "First", "[D14] fig. 1", "all well", checks, [table], [Picture(picture(), "a line")])
 
 
 @pytest.fixture
@@ -72,7 +69,7 @@ def test_it_writes_a_page_a_figure_and_tells_verdicts(tool: Tool) -> None:
     folder = tool.out / "validation"
     assert sorted(path.name for path in folder.iterdir()) == ["first.html", "index.html", "validation.json"]
     index, page = ((folder / name).read_text(encoding="utf-8") for name in ("index.html", "first.html"))
-    assert "1 of 2 judged statements hold, 1 more are told and not judged" in index
+    assert "1 of 2 judged statements hold, 1 more are reported and not judged" in index
     for text in (index, page):
         links = Links()
         links.feed(text)
@@ -82,11 +79,17 @@ def test_it_writes_a_page_a_figure_and_tells_verdicts(tool: Tool) -> None:
     assert "data:image/png;base64," in page
     lines = result.stdout.splitlines()
     assert lines[1].split()[:4] == ["first", "1", "1", "1"]
-    assert lines[2] == "first: a <tag> & more: expected 1, measured 2"
+    assert lines[2] == "first: a <tag> & more: expected < 1, measured 2"
     assert too_wide(result.stdout) == []
     document = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
-    assert document["pages"][0]["numbers"] == {"deep": [{"at": [1.5, [0, 1]]}], "3": True}
-    assert [check["holds"] for check in document["pages"][0]["checks"]] == [True, False, None]
+    assert document["pages"][0]["tables"] == {"rows": [{"a": "1", "b": 1.25, "c": [0.5, None]}]}
+    checks = {check["id"]: check for check in document["pages"][0]["checks"]}
+    assert {key: check["verdict"] for key, check in checks.items()} == {
+        "samples": "holds",
+        "tag": "misses",
+        "published": "reported",
+    }
+    assert (checks["tag"]["source"], checks["published"]["source"]) == ("closed form", "[D14] fig. 1")
 
 
 @pytest.mark.usefixtures("one_page")
@@ -101,7 +104,7 @@ def test_a_config_stands_for_a_snake(tool: Tool) -> None:
     config = tool.config("mine.toml", name="mine")
     result = tool("validate", "--bench", "--elaphe", config)
     assert result.code == 0, result.stderr
-    assert "(100, 100)" in (tool.out / "validation" / "first.html").read_text(encoding="utf-8")
+    assert "<td>&gt; 0</td><td>1e+04</td>" in (tool.out / "validation" / "first.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -141,7 +144,7 @@ def test_a_laser_line_has_no_colours_to_compare(tool: Tool) -> None:
 
 @pytest.mark.usefixtures("one_page")
 def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_bench: Bench, _progress: object) -> Figure:
+    def refuse(_bench: Bench, _progress: object) -> Page:
         raise AccuracyError("too tall")
 
     class Refusing:
@@ -155,7 +158,7 @@ def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypat
     monkeypatch.setattr(pages, "import_module", modules.__getitem__)
     result = tool("validate", "--bench")
     assert result.code == 0, result.stderr
-    assert "tall_one: this page, of these surfaces: expected made, measured too tall" in result.stdout
+    assert "tall_one: page of these surfaces (too tall): expected ≥ 1, measured 0" in result.stdout
     assert (tool.out / "validation" / "first.html").is_file()
 
 

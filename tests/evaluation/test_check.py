@@ -40,3 +40,9 @@ def test_text_and_json_come_from_the_numbers():
     assert (check.expected, check.measured) == ("≤ 3 s", "2.5 s")
     assert json.loads(json.dumps(check.document()))["verdict"] == "holds"
     assert Check("a", "a", 2.5, "=", 2.5, tolerance=0.25, unit="um").expected == "2.5 ± 0.25 um"
+
+
+def test_texts_show_the_digits_that_tell_value_and_bound_apart():
+    check = Check("a", "a", 2500.01, "=", 2500.0, tolerance=0.05, unit="nm")
+    assert (check.expected, check.measured) == ("2500 ± 0.05 nm", "2500.01 nm")
+    assert Check("a", "a", 2500.0, "=", 2500.0).measured == "2500"

@@ -5,7 +5,7 @@ rules of factorisation, without which TM of metals hardly converges. A grating i
 width, each as high as the profile at its middle. A layer lies between two neighbouring heights; its modes do not know
 how thick it is, so all depths of a profile share them.
 
-Two things of meent 0.13 to know: absorption is n - ik, and a substrate that absorbs is given the growing wave. So the
+Two conventions of meent 0.13: absorption is n - ik, and a substrate that absorbs is given the growing wave. So the
 material is a film here, thick enough for a metal to be opaque, on a substrate of its index' real part. Without
 absorption there is no interface between them.
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 
-# heights in [0, 1] at places in periods
+# heights in [0, 1] at positions in periods
 Profile = Callable[[Array], Array]
 # E along the grooves, or H
 Polarisation = Literal["TE", "TM"]
@@ -40,12 +40,12 @@ _ORDERS_SLOW, _BY_PERIOD_SLOW = 28, 2.0
 
 
 def available() -> bool:
-    """Whether the solver is installed: it is an extra."""
+    """Return whether the solver, an extra, is installed."""
     return find_spec("meent") is not None
 
 
 @dataclass(frozen=True)
-class Grating:
+class RigorousGrating:
     """A profile under light that travels towards +x at `theta`, radians.
 
     index: n + ik. k is a metal's, above 0.5, or next to nothing: 0 itself makes modes degenerate, 1e-6 does not.
@@ -82,15 +82,15 @@ class Staircase:
 
 
 def staircase(profile: Profile, columns: int) -> Staircase:
-    """The profile at the middles of columns of equal width, in layers between neighbouring heights."""
+    """Sample the profile at the middles of columns of equal width, in layers between neighbouring heights."""
     # equal heights may differ in their last digits
     heights = np.round(profile((np.arange(columns) + 0.5) / columns), 12)
     levels = np.unique(heights)[::-1]
     return Staircase(heights >= levels[:-1, None], -np.diff(levels))
 
 
-def solve(grating: Grating, depths: Array, polarisation: Polarisation, resolution: Resolution) -> Array:
-    """Reflected efficiencies (depths, orders -M..M) at one resolution; 0 of orders that do not propagate."""
+def solve(grating: RigorousGrating, depths: Array, polarisation: Polarisation, resolution: Resolution) -> Array:
+    """Return the reflected efficiencies (depths, orders -M..M) at one resolution; 0 of evanescent orders."""
     from meent.on_numpy.emsolver import transfer_method as transfer
 
     stairs, substrate = staircase(grating.profile, resolution.columns), grating.index.real
@@ -118,20 +118,20 @@ def _convolutions(stairs: Staircase, index: complex, orders: int) -> Any:
     return zip(*to_conv_mat_raster_continuous(cells[:, None, :], orders, 0), strict=True)
 
 
-def resolution_of(grating: Grating, polarisation: Polarisation, columns: int) -> Resolution:
-    """The coarser of the two from which the limit is extrapolated: all orders that propagate, and more."""
+def resolution_of(grating: RigorousGrating, polarisation: Polarisation, columns: int) -> Resolution:
+    """Return the coarser of the two resolutions that are extrapolated: all orders that propagate, and more."""
     if _slow(grating, polarisation):
         return Resolution(max(_ORDERS_SLOW, ceil(_BY_PERIOD_SLOW * grating.period)), columns)
     propagating = ceil(grating.period * (1.0 + abs(sin(grating.theta))))
     return Resolution(max(_ORDERS, propagating + _EVANESCENT), columns)
 
 
-def _slow(grating: Grating, polarisation: Polarisation) -> bool:
+def _slow(grating: RigorousGrating, polarisation: Polarisation) -> bool:
     return grating.metal and polarisation == "TM"
 
 
-def limit(grating: Grating, depths: Array, polarisation: Polarisation, resolution: Resolution) -> Array:
-    """Efficiencies (depths, orders -M..M) of the smooth profile, from a resolution and its double.
+def limit(grating: RigorousGrating, depths: Array, polarisation: Polarisation, resolution: Resolution) -> Array:
+    """Extrapolate efficiencies (depths, orders -M..M) to the smooth profile, from a resolution and its double.
 
     The staircase's error falls as 1 / columns^2, in TM of a metal as 1 / columns while orders grow with them
     (measured against a boundary integral's values: tests).
@@ -142,8 +142,8 @@ def limit(grating: Grating, depths: Array, polarisation: Polarisation, resolutio
     return np.asarray(fine + (fine - coarse) / (ratio - 1.0))
 
 
-def both_polarisations(grating: Grating, depths: Array, columns: int, order: int) -> Array:
-    """Efficiencies (2, depths) of TE and TM in one order, extrapolated."""
+def both_polarisations(grating: RigorousGrating, depths: Array, columns: int, order: int) -> Array:
+    """Return efficiencies (2, depths) of TE and TM in one order, extrapolated."""
     found = []
     for polarisation in POLARISATIONS:
         resolution = resolution_of(grating, polarisation, columns)

@@ -1,7 +1,7 @@
-"""The first order of the bench's gratings and snakes at theta_i = 75 deg ([D14] 6.1): what table 1 is made of.
+"""The first order of the bench's gratings and snakes at theta_i = 75 deg ([D14] 6.1), from which table 1 is made.
 
-Every estimate of a row's period by the exact |P|^2: with the window and the light where [D14] may have had them, in
-several ways for the blazed grating, and as the methods of [S14] find it.
+Every estimate of a row's period by the exact |P|^2: with the window and the light where [D14] may have had them, by
+several definitions for the blazed grating, and by the methods of [S14].
 """
 
 from collections.abc import Iterator
@@ -13,43 +13,58 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import peaks
-from pipeline.evaluation.figures.figure import Surface
+from pipeline.evaluation.figures.page import BenchSurface
 from pipeline.evaluation.figures.peaks import Band, Plane, Power
-from pipeline.evaluation.methods.catalogue import METHODS
+from pipeline.evaluation.figures.planes import window_on_sample_zero
+from pipeline.evaluation.methods.catalogue import FLSS, METHODS, NMM, PQ
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.optics.gratings import period_um, viewing_angle
 from pipeline.optics.light import Light
+from pipeline.surface.conditioning import condition
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.load import load_scan
 
 THETA_I = np.radians(75.0)  # [D14] sec. 6.1
 RANGE_NM = (380.0, 780.0)
 _MIDDLE_NM = 550.0
 # two lines closer than this are one under the window
 _APART_SIGMAS = 3.0
-BRIGHTER = "light from the brighter side"
+_BRIGHTER = "light from the brighter side"
 _TURNS_DEG = (-2.0, 2.0)
 ANGLE_GRID_DEG = 0.01
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of table 1: a surface, the axis its period is along, where to look, and what is printed, nm and nm^2.
+    """A row of table 1: a surface, the axis of its period, the range to search, and the printed periods.
 
-    Two printed periods are two lines that the brightest peak toggles between.
+    key: its name in ids. published: mean and variance, nm and nm^2. Two printed periods are two lines that the
+    brightest peak toggles between.
     """
 
+    key: str
     label: str
     surface: Literal["blazed", "elaphe", "xenopeltis"]
     axis: Literal["x", "y"]
     search_um: tuple[float, float]
     published: tuple[tuple[float, float], ...]
 
+    @property
+    def planes(self) -> tuple[Plane, Plane]:
+        """Light from either end of the axis."""
+        along = 0.0 if self.axis == "x" else 0.5 * np.pi
+        return Plane(THETA_I, along), Plane(THETA_I, along + np.pi)
+
+    def band(self, surface: BenchSurface) -> Band:
+        """Return the frequencies to search under a surface's window."""
+        return peaks.band_of(self.search_um, surface.sigma_um)
+
 
 ROWS = (
-    Row("Blazed grating", "blazed", "x", (2.0, 3.0), ((2500.34, 0.16),)),
-    Row("Elaphe", "elaphe", "x", (0.95, 1.35), ((1144.28, 0.15),)),
-    Row("Xenopeltis, along fingers", "xenopeltis", "y", (1.35, 1.8), ((1552.27, 0.45),)),
-    Row("Xenopeltis, across fingers", "xenopeltis", "x", (0.42, 0.75), ((605.89, 0.12), (536.13, 0.04))),
+    Row("blazed", "Blazed grating", "blazed", "x", (2.0, 3.0), ((2500.34, 0.16),)),
+    Row("elaphe", "Elaphe", "elaphe", "x", (0.95, 1.35), ((1144.28, 0.15),)),
+    Row("along", "Xenopeltis, along fingers", "xenopeltis", "y", (1.35, 1.8), ((1552.27, 0.45),)),
+    Row("across", "Xenopeltis, across fingers", "xenopeltis", "x", (0.42, 0.75), ((605.89, 0.12), (536.13, 0.04))),
 )
 
 
@@ -64,23 +79,20 @@ class Periods:
         return float(self.nm.mean())
 
     @property
-    def variance(self) -> float:
-        return float(self.nm.var())
-
-    def __str__(self) -> str:
-        return f"{self.mean:.2f} ({self.variance:.2f})"
+    def spread(self) -> tuple[float, float]:
+        """Mean, nm, and variance, nm^2, as table 1 prints them."""
+        return self.mean, float(self.nm.var())
 
 
 @dataclass(frozen=True)
 class Cut:
-    """One plane of incidence on one surface: the reflectance (L, k) over frequencies `f` (k,), and its peaks.
+    """One plane of incidence on one surface: the reflectance (L, k) over frequencies (k,), and its peaks.
 
     brightest: of each wavelength, as [D14] takes it. lines: those that persist over all wavelengths, as peaks of the
-    reflectance and freed of what multiplies the window's line (pipeline.evaluation.figures.peaks).
+    reflectance and freed of the factors on the window's line (pipeline.evaluation.figures.peaks).
     """
 
     plane: Plane
-    f: Array
     reflectance: Array
     brightest: Periods
     lines: tuple[tuple[Periods, Periods], ...]
@@ -92,50 +104,54 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class Case:
+class FirstOrder:
     """A row on a surface: the plane whose first order is brighter, and the other side's."""
 
     row: Row
-    surface: Surface
+    surface: BenchSurface
     cut: Cut
     other: Cut
 
+    @property
+    def band(self) -> Band:
+        return self.row.band(self.surface)
+
 
 class Powers:
-    """The exact |P|^2 of fields, each made once."""
+    """|P|^2 of height fields, exact and by the methods of [S14], each prepared once."""
 
     def __init__(self) -> None:
-        self._made: dict[tuple[str, float], tuple[HeightField, Reference]] = {}
+        self._made: dict[tuple[str, float | str], Power] = {}
 
     def of(self, name: str, field: HeightField, sigma_um: float) -> Power:
+        """Return the power of a field under a window; each name must belong to one field."""
         key = (name, sigma_um)
         if key not in self._made:
-            self._made[key] = (field, Reference(field, sigma_um, RANGE_NM[0]))
-        return self._made[key][1].power
+            self._made[key] = Reference(field, sigma_um, RANGE_NM[0]).power
+        return self._made[key]
+
+    def on(self, surface: BenchSurface, widths: float = 1.0) -> Power:
+        """Return the power of a surface under its window, made wider by a factor."""
+        return self.of(surface.name, surface.field, widths * surface.sigma_um)
+
+    def by(self, name: str, surface: BenchSurface) -> Power:
+        """Return the power of a surface by a method of [S14], over the range of table 1."""
+        if (surface.name, name) not in self._made:
+            config = surface.config.model_copy(update={"light": Light(range_nm=RANGE_NM)})
+            method = METHODS[name](surface.field, config)
+            assert isinstance(method, Monochromatic)
+            self._made[surface.name, name] = method.power
+        return self._made[surface.name, name]
 
 
-# --- one surface, one plane --------------------------------------------------------------------------
-
-
-def case_of(row: Row, surface: Surface, powers: Powers, lambda_nm: Array) -> Case:
-    power = powers.of(surface.name, surface.field, surface.config.coherence.sigma_um)
-    cuts = [cut_of(power, plane, row, band_for(row, surface), lambda_nm) for plane in sides(row)]
-    cuts.sort(key=lambda cut: -cut.brightness)
-    return Case(row, surface, *cuts)
-
-
-def sides(row: Row) -> tuple[Plane, Plane]:
-    """Light from either end of the row's axis."""
-    along = 0.0 if row.axis == "x" else 0.5 * np.pi
-    return Plane(THETA_I, along), Plane(THETA_I, along + np.pi)
-
-
-def band_for(row: Row, surface: Surface) -> Band:
-    return peaks.band_of(row.search_um, surface.config.coherence.sigma_um)
+def first_order(row: Row, surface: BenchSurface, powers: Powers, lambda_nm: Array) -> FirstOrder:
+    """Find a row's period on a surface with the light from both sides."""
+    cuts = [cut_of(powers.on(surface), plane, row, row.band(surface), lambda_nm) for plane in row.planes]
+    return FirstOrder(row, surface, *sorted(cuts, key=lambda cut: -cut.brightness))
 
 
 def cut_of(power: Power, plane: Plane, row: Row, band: Band, lambda_nm: Array) -> Cut:
-    """The reflectance in one plane, its brightest peaks and the row's persistent lines."""
+    """Compute the reflectance in one plane, its brightest peaks and the row's persistent lines."""
     f = band.grid()
     values = peaks.reflectance(power, plane, f, lambda_nm)
     best = peaks.peaks(power, plane, peaks.brightest(values, f), lambda_nm, band.sigma_f)
@@ -145,7 +161,7 @@ def cut_of(power: Power, plane: Plane, row: Row, band: Band, lambda_nm: Array) -
         lines.append((_periods(raw), _periods(peaks.lines(power, plane, raw, lambda_nm, band.sigma_f))))
     # the longer period first, as table 1 has them
     lines.sort(key=lambda pair: -pair[1].mean)
-    return Cut(plane, f, values, _periods(best), tuple(lines))
+    return Cut(plane, values, _periods(best), tuple(lines))
 
 
 def _periods(f: Array) -> Periods:
@@ -158,12 +174,9 @@ def _brightest(power: Power, plane: Plane, band: Band, lambda_nm: Array) -> Peri
     return _periods(peaks.brightest(peaks.reflectance(power, plane, f, lambda_nm), f))
 
 
-# --- the blazed grating ------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Blaze:
-    """The same order, estimated in several ways.
+    """The first order of the blazed grating by several definitions.
 
     raw: peaks of eq. 4's reflectance. shadowed: of the surface's material. wide: raw at twice the window.
     extrapolated: of raw and wide, to a line of no width. line: at one s. on_grid: raw, on angles 0.01 deg apart.
@@ -177,56 +190,50 @@ class Blaze:
     on_grid: Periods
 
 
-def blaze_of(case: Case, powers: Powers, lambda_nm: Array) -> Blaze:
-    surface, plane = case.surface, case.cut.plane
-    sigma = surface.config.coherence.sigma_um
-    band = band_for(case.row, surface)
-    narrow, wide = (powers.of(surface.name, surface.field, factor * sigma) for factor in (1.0, 2.0))
-    raw, line = case.cut.lines[0]
-    start = 1e3 / raw.nm
-    shadowed = peaks.peaks(narrow, plane, start, lambda_nm, band.sigma_f, surface.config.material)
-    wider = _periods(peaks.peaks(wide, plane, start, lambda_nm, 0.5 * band.sigma_f))
-    # the shift goes with sigma_f^2, a quarter at twice the window
-    extrapolated = Periods((4.0 * wider.nm - raw.nm) / 3.0)
+def blaze_of(found: FirstOrder, powers: Powers, lambda_nm: Array) -> Blaze:
+    """Estimate the period of the blazed grating by every definition."""
+    surface, plane, width = found.surface, found.cut.plane, found.band.sigma_f
+    raw, line = found.cut.lines[0]
+    start, material = 1e3 / raw.nm, surface.config.material
+    shadowed = peaks.peaks(powers.on(surface), plane, start, lambda_nm, width, material)
+    wide = _periods(peaks.peaks(powers.on(surface, 2.0), plane, start, lambda_nm, 0.5 * width))
+    # the shift is proportional to sigma_f^2, a quarter at twice the window
+    extrapolated = Periods((4.0 * wide.nm - raw.nm) / 3.0)
     angles = np.degrees(viewing_angle(THETA_I, 1e-3 * raw.nm, 1e-3 * lambda_nm))
     rounded = np.radians(ANGLE_GRID_DEG * np.rint(angles / ANGLE_GRID_DEG))
     on_grid = Periods(1e3 * period_um(THETA_I, rounded, 1e-3 * lambda_nm))
-    return Blaze(raw, _periods(shadowed), wider, extrapolated, line, on_grid)
-
-
-# --- where the window stands -------------------------------------------------------------------------
+    return Blaze(raw, _periods(shadowed), wide, extrapolated, line, on_grid)
 
 
 @dataclass(frozen=True)
-class Walk:
-    """The brightest period at 550 nm with the window at (places, places) places of the patch.
+class ByPosition:
+    """The brightest period at 550 nm with the window at (count, count) positions on the patch.
 
-    periods: nm (places, places, 2), with the light at the axis' start and at its other end. mean: nm (2,), of |P|^2
-    averaged over all places.
+    periods: nm (count, count, 2), with the light at the axis' start and at its other end. mean: nm (2,), of |P|^2
+    averaged over all positions.
     """
 
-    case: Case
+    row: Row
     periods: Array
     mean: Array
 
     def quantiles(self, share: float) -> tuple[float, float]:
-        """What all but `share` of the places lie between, nm, both sides together."""
+        """Return the ends, nm, between which all but a share of the positions lie, both sides together."""
         low, high = np.quantile(self.periods, [0.5 * share, 1.0 - 0.5 * share])
         return float(low), float(high)
 
 
-def walk_of(case: Case, places: int) -> Walk:
-    row, surface = case.row, case.surface
-    band, plane = band_for(row, surface), case.cut.plane
-    f = band.grid()
+def by_position(found: FirstOrder, count: int) -> ByPosition:
+    """Move the window over the patch of a surface."""
+    row, surface, plane, f = found.row, found.surface, found.cut.plane, found.band.grid()
     field = surface.field if row.axis == "x" else _transposed(surface.field)
     s = peaks.phase_rate(plane, float(f.mean()), _MIDDLE_NM)
-    values = peaks.walk(field, surface.config.coherence.sigma_um, s, f, places)
+    values = peaks.by_position(field, surface.sigma_um, s, f, count)
     # C at the wavelength decides which of several lines is the brightest
     factor = peaks.reflectance(_mirror, plane, f, np.array([_MIDDLE_NM]))[0]
     periods = 1e3 / peaks.brightest((values * factor).reshape(-1, len(f)), f)
     mean = 1e3 / peaks.brightest(values.mean(axis=(0, 1)) * factor, f)
-    return Walk(case, periods.reshape(values.shape[:-1]), mean)
+    return ByPosition(row, periods.reshape(values.shape[:-1]), mean)
 
 
 def _mirror(uvw: Array, lambda_nm: Array) -> Array:
@@ -235,76 +242,51 @@ def _mirror(uvw: Array, lambda_nm: Array) -> Array:
 
 
 def _transposed(field: HeightField) -> HeightField:
-    """The field with x and y changed."""
+    """The field with x and y exchanged."""
     return HeightField(np.ascontiguousarray(field.heights_um.T), field.pitch_um[::-1])
 
 
-def _on_sample_zero(field: HeightField) -> HeightField:
-    """The patch with its sample 0 where the window is: the window on the patch's corner, its seams under it."""
-    ny, nx = field.shape
-    return HeightField(np.roll(field.heights_um, (ny // 2, nx // 2), axis=(0, 1)), field.pitch_um)
-
-
-def variants(case: Case, powers: Powers, lambda_nm: Array) -> Iterator[tuple[str, Periods]]:
-    """The brightest periods under everything that [D14] does not tell."""
-    surface, plane, band = case.surface, case.cut.plane, band_for(case.row, case.surface)
-    sigma = surface.config.coherence.sigma_um
-    sides = {BRIGHTER: case.cut, "light from the other side": case.other}
+def variants(found: FirstOrder, powers: Powers, lambda_nm: Array) -> Iterator[tuple[str, Periods]]:
+    """Yield the brightest periods under every setting that [D14] leaves open."""
+    surface, plane, band = found.surface, found.cut.plane, found.band
+    sides = {_BRIGHTER: found.cut, "light from the other side": found.other}
     for name, cut in sides.items():
         yield name, cut.brightest
-    corner = powers.of(f"{surface.name}, corner", _on_sample_zero(surface.field), sigma)
+    corner = powers.of(f"{surface.name}, corner", window_on_sample_zero(surface.field), surface.sigma_um)
     for name, cut in sides.items():
         yield f"window on sample 0, {name}", _brightest(corner, cut.plane, band, lambda_nm)
-    here = powers.of(surface.name, surface.field, sigma)
     for turn in _TURNS_DEG:
         turned = Plane(plane.theta_i, plane.azimuth + np.radians(turn))
-        yield f"{BRIGHTER}, plane turned by {turn:+g}°", _brightest(here, turned, band, lambda_nm)
+        periods = _brightest(powers.on(surface), turned, band, lambda_nm)
+        yield f"{_BRIGHTER}, plane turned by {turn:+g}°", periods
     for level, field in _levelled(surface):
-        power = powers.of(f"{surface.name}, {level}", field, sigma)
-        yield f"{BRIGHTER}, levelling: {level}", _brightest(power, plane, band, lambda_nm)
+        power = powers.of(f"{surface.name}, {level}", field, surface.sigma_um)
+        yield f"{_BRIGHTER}, levelling: {level}", _brightest(power, plane, band, lambda_nm)
 
 
-def _levelled(surface: Surface) -> Iterator[tuple[str, HeightField]]:
+def _levelled(surface: BenchSurface) -> Iterator[tuple[str, HeightField]]:
     """The scan under the levellings that its config does not choose; nothing for a recipe."""
     section = surface.config.surface
     if section.path is None:
         return
-    from pipeline.surface.conditioning import condition
-    from pipeline.surface.load import load_scan
-
     scan = load_scan(section)[0]
     for level in ("none", "plane", "quadratic"):
         if level != section.levelling:
             yield level, condition(scan, level, section.clip_percentile)[0]
 
 
-class ShaderPowers:
-    """|P|^2 by the methods of [S14] that answer single wavelengths, each made once a surface."""
-
-    def __init__(self) -> None:
-        self._made: dict[tuple[str, str], Power] = {}
-
-    def of(self, name: str, surface: Surface) -> Power:
-        if (name, surface.name) not in self._made:
-            config = surface.config.model_copy(update={"light": Light(range_nm=RANGE_NM)})
-            method = METHODS[name](surface.field, config)
-            assert isinstance(method, Monochromatic)
-            self._made[name, surface.name] = method.power
-        return self._made[name, surface.name]
-
-
-def by_shaders(case: Case, powers: ShaderPowers, lambda_nm: Array) -> dict[str, Periods]:
-    """The brightest periods that the methods of [S14] find in the case's plane.
+def by_shaders(found: FirstOrder, powers: Powers, lambda_nm: Array) -> dict[str, Periods]:
+    """Return the brightest periods that the methods of [S14] find in the plane.
 
     NMM asks FLSS at the DFT's own frequencies alone, n over the patch's size: one of them is its peak.
     """
-    plane, band = case.cut.plane, band_for(case.row, case.surface)
-    flss = powers.of("FLSS", case.surface)
-    size = case.surface.field.size_um[0 if case.row.axis == "x" else 1]
+    plane, band, surface = found.cut.plane, found.band, found.surface
+    flss, pq = (powers.by(name, surface) for name in (FLSS, PQ))
+    size = surface.field.size_um[0 if found.row.axis == "x" else 1]
     coefficients = np.arange(np.ceil(band.low * size), np.floor(band.high * size) + 1.0) / size
     values = peaks.reflectance(flss, plane, coefficients, lambda_nm)
     return {
-        "FLSS": _brightest(flss, plane, band, lambda_nm),
-        "NMM": _periods(coefficients[np.argmax(values, axis=1)]),
-        "PQ": _brightest(powers.of("PQ", case.surface), plane, band, lambda_nm),
+        FLSS: _brightest(flss, plane, band, lambda_nm),
+        NMM: _periods(coefficients[np.argmax(values, axis=1)]),
+        PQ: _brightest(pq, plane, band, lambda_nm),
     }

@@ -1,8 +1,8 @@
-"""[D14]'s laser on a screen: where its pixels look, under which light, and the bands they show.
+"""The laser and the screen of [D14] sec. 6.2: directions of the pixels, the light, and the bands of an image.
 
-The beam meets the sample at 45 deg. The screen stands 100 mm from it, parallel to the incoming beam, which is to say
-square to the mirror direction, whose spot is its middle. [D14] does not tell its size: 200 mm a side fills the plane
-of incidence from the normal to the horizon.
+The beam meets the sample at 45 deg. The screen is 100 mm from it, parallel to the incoming beam and thus square to
+the mirror direction, whose spot is its middle. [D14] does not state its size: 200 mm a side fills the plane of
+incidence from the normal to the horizon.
 """
 
 from collections.abc import Callable
@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config.models import Accuracy, Config
+from pipeline.evaluation.figures.bands import Bands, bands_of
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.light import Light
@@ -23,10 +24,6 @@ from pipeline.tables.polar.layout import PolarLayout
 LIGHT = Direction(theta_deg=45.0, phi_deg=180.0)
 APERTURE_UM = 65.0
 # the screen shows little else but the light near the mirror direction, which random directions seldom meet
-# a step of luminance that is barely seen, Weber's fraction: a band of less contrast is none
-VISIBLE_CONTRAST = 0.02
-# of the brightest row: a darker one counts as that dark
-_DARK_SHARE = 1e-9
 DELTA_E = 0.04
 # columns this near the middle hold the spot and a vertical band; rows this near it hold the primary band
 _SPOT_MM, _PRIMARY_MM = 15.0, 8.0
@@ -50,11 +47,11 @@ class Screen:
     samples: int = 1
 
     def axis_mm(self) -> Array:
-        """Middles of the pixels along x, and along y upwards, from the spot."""
+        """Return the middles of the pixels along x, and along y upwards, from the spot."""
         return _middles(self.pixels, self.side_mm)
 
     def directions(self) -> tuple[Array, Array]:
-        """wi and wr (directions, 3), row by row from the top.
+        """Return wi and wr (directions, 3), row by row from the top.
 
         +x leans away from the normal, in the plane of incidence; +y lies in the sample's plane, a quarter turn on
         from the mirror direction's azimuth.
@@ -71,12 +68,12 @@ class Screen:
         return np.broadcast_to(wi, wr.shape), wr
 
     def image(self, values: Array) -> Array:
-        """Pixels (pixels, pixels, channels): the mean of each one's directions (directions, channels)."""
+        """Return pixels (pixels, pixels, channels): the mean of each one's directions (directions, channels)."""
         n, k = self.pixels, self.samples
         return np.asarray(values.reshape(n, k, n, k, -1).mean(axis=(1, 3)))
 
     def show(self, colour: Colour) -> Array:
-        """XYZ (pixels, pixels, 3) of a method."""
+        """Return XYZ (pixels, pixels, 3) of a method."""
         return self.image(colour(*self.directions()))
 
 
@@ -85,7 +82,7 @@ def _middles(count: int, side_mm: float) -> Array:
 
 
 def experiment(config: Config) -> Config:
-    """The config of a surface under [D14]'s laser, aperture and gold."""
+    """Return the config of a surface under [D14]'s laser, aperture and gold."""
     laser = str(files("pipeline.optics").joinpath("data", "supercontinuum.csv"))
     return config.model_copy(
         update={
@@ -99,31 +96,6 @@ def experiment(config: Config) -> Config:
     )
 
 
-@dataclass(frozen=True)
-class Bands:
-    """Secondary horizontal bands above and below the primary one.
-
-    profile: mean Y of each row beside the spot, from the top. contrast: by how much a band is at most brighter than
-    the darkest row between it and the primary one, over that row. share: of the light outside the primary band, what
-    rises above the darkest row further in.
-    """
-
-    profile: Array
-    contrast: float
-    share: float
-
-
-def bands_of(luminance: Array, axis_mm: Array) -> Bands:
-    """The bands of an image of Y (pixels, pixels), `axis_mm` (pixels,) from the spot."""
-    profile = luminance[:, np.abs(axis_mm) > _SPOT_MM].mean(axis=1)
-    middle = len(profile) // 2
-    outside = axis_mm[middle:] > _PRIMARY_MM
-    contrast, excess, light = 0.0, 0.0, 0.0
-    for outwards in (profile[middle::-1], profile[middle:]):
-        floor = np.minimum.accumulate(outwards)[outside]
-        rise = outwards[outside] - floor
-        # beyond the scan's band all is dark
-        dark = _DARK_SHARE * float(profile.max())
-        contrast = max(contrast, float(np.max(rise / np.maximum(floor, dark))))
-        excess, light = excess + float(rise.sum()), light + float(outwards[outside].sum())
-    return Bands(profile, contrast, excess / light)
+def screen_bands(luminance: Array, axis_mm: Array) -> Bands:
+    """Find the bands of an image of Y (pixels, pixels) without the spot's columns; `axis_mm` (pixels,) is from it."""
+    return bands_of(luminance[:, np.abs(axis_mm) > _SPOT_MM].mean(axis=1), axis_mm, _PRIMARY_MM)

@@ -1,14 +1,16 @@
-"""What physics says of a BRDF map in closed form or by order of place: what the pages of maps are judged by."""
+"""Closed forms of BRDF maps, and where their light goes: the predictions that pages of maps are judged by."""
 
 from collections.abc import Sequence
 from math import radians
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
-from pipeline.evaluation.figures.exact_maps import Light, directions
+from pipeline.evaluation.figures import planes
+from pipeline.evaluation.figures.maps import Light, directions
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.light import trapezoid
@@ -26,13 +28,12 @@ _PEAK_SAMPLES, _PEAK_WIDTHS = 401, 3.0
 def sectors(
     luminance: Array, views: Map, light: Light, rho: tuple[float, float] = (SPECULAR_RHO, RHO_MAX)
 ) -> tuple[float, float]:
-    """Shares of a ring's luminance (views,) within 22.5 degrees of the horizontal and of the vertical of (u, v).
+    """Return the shares of a ring's luminance (views,) within 22.5 degrees of the horizontal and of the vertical.
 
-    Pixels are even in the views' direction cosines, so their sum is the reflected flux over cos(theta_r).
+    rho: the ring's radii in (u, v). Pixels are evenly spaced in the views' direction cosines, so their sum is the
+    reflected flux over cos(theta_r).
     """
-    uvw = geometry.uvw(*directions(views, light))
-    distance, angle = np.hypot(uvw[:, 0], uvw[:, 1]), np.arctan2(np.abs(uvw[:, 1]), np.abs(uvw[:, 0]))
-    ring = (distance > rho[0]) & (distance <= rho[1])
+    _, angle, ring = _polar(views, light, rho)
     total = luminance[ring].sum()
     horizontal = luminance[ring & (angle < _SECTOR_RAD)].sum()
     vertical = luminance[ring & (angle > radians(90.0) - _SECTOR_RAD)].sum()
@@ -40,17 +41,25 @@ def sectors(
 
 
 def below_over_above(luminance: Array, views: Map, light: Light, rho: tuple[float, float]) -> float:
-    """Luminance (views,) of a ring's vertical sector below the mirror direction over that above it."""
-    uvw = geometry.uvw(*directions(views, light))
-    distance, angle = np.hypot(uvw[:, 0], uvw[:, 1]), np.arctan2(np.abs(uvw[:, 1]), np.abs(uvw[:, 0]))
-    vertical = (distance > rho[0]) & (distance <= rho[1]) & (angle > radians(90.0) - _SECTOR_RAD)
+    """Return the luminance (views,) of a ring's vertical sector below the mirror direction over that above it."""
+    v, angle, ring = _polar(views, light, rho)
+    vertical = ring & (angle > radians(90.0) - _SECTOR_RAD)
     # v = -wi_y - wr_y grows downwards
-    below = uvw[:, 1] > 0.0
-    return float(luminance[vertical & below].sum() / luminance[vertical & ~below].sum())
+    return float(luminance[vertical & (v > 0.0)].sum() / luminance[vertical & (v <= 0.0)].sum())
 
 
-def first_orders(wr: Array, recipe: Blazed, range_nm: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """bool (views,): views in a grating's plane and its first order, left and right, at normal incidence."""
+def _polar(views: Map, light: Light, rho: tuple[float, float]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return v, the angle between (u, v) and the horizontal, 0 to 90 degrees, and the ring's views, (views,) each."""
+    uvw = geometry.uvw(*directions(views, light))
+    distance = np.hypot(uvw[:, 0], uvw[:, 1])
+    angle = np.arctan2(np.abs(uvw[:, 1]), np.abs(uvw[:, 0]))
+    return uvw[:, 1], angle, (distance > rho[0]) & (distance <= rho[1])
+
+
+def first_orders(
+    wr: Array, recipe: Blazed, range_nm: tuple[float, float]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the views (views,) in a grating's plane and its first order, left and right, at normal incidence."""
     low, high = (1e-3 * nm / recipe.period_um for nm in range_nm)
     # an odd number of pixels has a row of them in the plane
     in_plane = (np.abs(wr[:, 1]) < 1e-9) & (np.abs(wr[:, 0]) > low) & (np.abs(wr[:, 0]) < high)
@@ -58,10 +67,11 @@ def first_orders(wr: Array, recipe: Blazed, range_nm: tuple[float, float]) -> tu
 
 
 def blazed_luminance(config: Config, recipe: Blazed, wr: Array) -> Array:
-    """Y (views,) of a sawtooth at normal incidence, views in its plane: c_m = sinc(m + w h / lambda), each order seen
-    through the window's transform.
+    """Return Y (views,) of a sawtooth at normal incidence for views in its plane.
+
+    c_m = sinc(m + w h / lambda), each order seen through the window's transform.
     """
-    wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape)
+    wi = planes.normal_light(wr)
     rule, uvw = trapezoid(config.light, STEP_NM), geometry.uvw(wi, wr)
     lambda_um, width = 1e-3 * rule.lambda_nm, sigma_f(config.coherence.sigma_um)
     power = np.zeros((len(wr), len(lambda_um)))
@@ -72,18 +82,16 @@ def blazed_luminance(config: Config, recipe: Blazed, wr: Array) -> Array:
     return np.asarray(brdf.direction_factor(config.material, rule, wi, wr) * (power @ rule.weights[:, 1]))
 
 
-def order_places(
+def order_sines(
     exact: Reference, sigma_um: float, period_um: float, lambda_nm: float, orders: Sequence[int]
 ) -> tuple[Array, Array]:
-    """sin theta along the vertical of a period's orders at normal incidence, expected (m lambda / period) and found.
+    """Return sin theta along the vertical of a period's orders at normal incidence, expected and found.
 
-    Found is where |P|^2 is brightest within three widths of the window's transform.
+    Expected is m lambda / period; found is where |P|^2 is brightest within three widths of the window's transform.
     """
     lambda_um = 1e-3 * lambda_nm
     expected = lambda_um / period_um * np.array(orders)
     offsets = np.linspace(-1.0, 1.0, _PEAK_SAMPLES) * _PEAK_WIDTHS * sigma_f(sigma_um) * lambda_um
-    y = (expected[:, None] + offsets).ravel()
-    wr = np.stack([np.zeros_like(y), y, np.sqrt(1.0 - y**2)], axis=-1)
-    wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape)
+    wi, wr = planes.under_normal_light(0.0, (expected[:, None] + offsets).ravel())
     power = exact.power(geometry.uvw(wi, wr), np.array([lambda_nm])).reshape(len(orders), -1)
     return expected, np.asarray(expected + offsets[np.argmax(power, axis=1)])

@@ -1,15 +1,14 @@
-"""The pages of the validation bench, in order, and making them all."""
+"""The pages of the validation bench in order, and the command that makes them all."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 from pipeline.errors import BakeError
-from pipeline.evaluation.figures.figure import Bench, Check, Figure
+from pipeline.evaluation.check import Check
+from pipeline.evaluation.figures.page import Bench, Page
 from pipeline.progress import Progress
 from pipeline.stages import provenance
 
@@ -34,58 +33,36 @@ PAGES = (
 class Made:
     """A page and the seconds it took."""
 
-    figure: Figure
+    page: Page
     seconds: float
 
 
-def make_all(bench: Bench, progress: Progress, tell: Callable[[str], None]) -> Iterator[Made]:
-    """Every page, one after the other; `tell` hears of each."""
+def make_all(bench: Bench, progress: Progress, note: Callable[[str], None]) -> Iterator[Made]:
+    """Make every page, one after the other; `note` is called with a line about each."""
     for name in PAGES:
         started = time.perf_counter()
         try:
-            figure = import_module(f"pipeline.evaluation.figures.{name}").make(bench, progress)
+            page = import_module(f"pipeline.evaluation.figures.{name}").make(bench, progress)
         except BakeError as error:
-            figure = _not_made(name, error)
-        made = Made(figure, time.perf_counter() - started)
-        tell(f"  {name:<20} {made.seconds:5.1f} s")
+            page = _not_made(name, error)
+        made = Made(page, time.perf_counter() - started)
+        note(f"  {name:<20} {made.seconds:5.1f} s")
         yield made
 
 
-def _not_made(name: str, error: BakeError) -> Figure:
-    """A page that these surfaces do not allow says so, and takes no other page with it."""
+def _not_made(name: str, error: BakeError) -> Page:
+    """A page that these surfaces do not allow states the reason, and the other pages are made."""
     reason = " ".join(str(error).split())
-    return Figure(
-        name=name,
-        title=f"{name.replace('_', ' ').capitalize()}: not made",
-        source="",
-        expected="",
-        checks=[Check("this page, of these surfaces", "made", reason, False)],
+    check = Check("made", f"page of these surfaces ({reason})", 0, ">=", 1)
+    return Page(
+        name=name, title=f"{name.replace('_', ' ').capitalize()}: not made", source="", expected="", checks=[check]
     )
 
 
 def document(made: Sequence[Made]) -> dict[str, Any]:
-    """All that was measured, for machines."""
+    """Return everything that was measured, for JSON."""
     return {
         "versions": provenance.versions(),
         "device": provenance.device(),
-        "pages": [
-            {
-                "name": page.figure.name,
-                "title": page.figure.title,
-                "source": page.figure.source,
-                "seconds": page.seconds,
-                "checks": [asdict(check) for check in page.figure.checks],
-                "numbers": _plain(page.figure.numbers),
-            }
-            for page in made
-        ],
+        "pages": [{**each.page.document(), "seconds": each.seconds} for each in made],
     }
-
-
-def _plain(value: Any) -> Any:
-    """Without numpy's types, which JSON does not know."""
-    if isinstance(value, dict):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

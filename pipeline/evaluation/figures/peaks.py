@@ -1,4 +1,4 @@
-"""Where a surface's first order stands in one plane of incidence: peaks of its reflectance, the lines behind them.
+"""The first order of a surface in one plane of incidence: peaks of its reflectance, and the lines behind them.
 
 Along the plane a view is named by f = (sin theta_i - sin phi) / lambda, 1/um: the frequency whose first order it
 meets (pipeline.optics.gratings), so that a peak at f is a period 1 / f.
@@ -45,35 +45,35 @@ class Plane:
     azimuth: float
 
     def phi(self, f: Array, lambda_um: Array) -> Array:
-        """Viewing angles of frequencies, radians; NaN beyond the horizon. `f` and `lambda_um` broadcast."""
+        """Return viewing angles of frequencies, radians; NaN beyond the horizon. `f` and `lambda_um` broadcast."""
         sine = np.sin(self.theta_i) - f * lambda_um
         return np.arcsin(np.where(np.abs(sine) < 1.0, sine, np.nan))
 
     def directions(self, f: Array, lambda_um: Array) -> tuple[Array, Array]:
-        """wi, wr (..., 3)."""
+        """Return wi and wr (..., 3)."""
         return in_plane(self.theta_i, self.azimuth, self.phi(f, lambda_um))
 
 
 @dataclass(frozen=True)
 class Band:
-    """Where peaks are looked for: frequencies from `low` to `high`, 1/um, and the window's sigma_f."""
+    """The range in which peaks are looked for: frequencies from `low` to `high`, 1/um, and the window's sigma_f."""
 
     low: float
     high: float
     sigma_f: float
 
     def grid(self) -> Array:
-        """Frequencies a quarter of sigma_f apart."""
+        """Return frequencies a quarter of sigma_f apart."""
         return np.linspace(self.low, self.high, int(np.ceil(_GRID_STEPS * (self.high - self.low) / self.sigma_f)) + 1)
 
 
 def band_of(periods_um: tuple[float, float], sigma_um: float) -> Band:
-    """The band of a range of periods."""
+    """Return the band of a range of periods."""
     return Band(1.0 / max(periods_um), 1.0 / min(periods_um), sigma_f(sigma_um))
 
 
 def reflectance(power: Power, plane: Plane, f: Array, lambda_nm: Array, material: Material = BRDF) -> Array:
-    """C |P|^2 (L, k) at frequencies `f` (k,) or (L, k); 0 beyond the horizon and the scan's band."""
+    """Return C |P|^2 (L, k) at frequencies `f` (k,) or (L, k); 0 beyond the horizon and the Nyquist limits."""
     lambda_um = 1e-3 * lambda_nm[:, None]
     wi, wr = plane.directions(*np.broadcast_arrays(f, lambda_um))
     seen = np.isfinite(wr[..., 0])
@@ -88,7 +88,7 @@ def _own_wavelength(power: Power, uvw: Array, lambda_nm: Array) -> Array:
 
 
 def brightest(values: Array, f: Array) -> Array:
-    """The frequency (L,) of each row's largest value (L, k) on an even grid `f` (k,), refined by a parabola."""
+    """Return the frequency (L,) of each row's largest value (L, k) on a grid `f` (k,), refined by a parabola."""
     place = np.argmax(values, axis=1)
     return _parabola(values, f, np.clip(place, 1, len(f) - 2))
 
@@ -104,9 +104,10 @@ def _parabola(values: Array, f: Array, place: NDArray[np.intp]) -> Array:
 
 
 def persistent(values: Array, f: Array, count: int, apart: float) -> Array:
-    """Where (count,) the mean over wavelengths of `values` (L, k), each row over its largest, is brightest.
+    """Return the frequencies (count,) where the mean over wavelengths of `values` (L, k) is brightest.
 
-    Only local maxima count, and none within `apart` of a brighter one. Raises AccuracyError where there are fewer.
+    Each row is divided by its largest value. Only local maxima count, and none within `apart` of a brighter one.
+    Raises AccuracyError where there are fewer.
     """
     mean = np.mean(values / values.max(axis=1, keepdims=True), axis=0)
     tops = 1 + np.flatnonzero((mean[1:-1] > mean[:-2]) & (mean[1:-1] >= mean[2:]))
@@ -122,12 +123,12 @@ def persistent(values: Array, f: Array, count: int, apart: float) -> Array:
 def peaks(
     power: Power, plane: Plane, start: Array, lambda_nm: Array, width: float, material: Material = BRDF
 ) -> Array:
-    """Frequencies (L,) of the reflectance's maxima near `start` (L,), by Newton's method; `width` is sigma_f."""
+    """Find frequencies (L,) of the reflectance's maxima near `start` (L,) by Newton's method; `width` is sigma_f."""
     return _climb(lambda f: reflectance(power, plane, f, lambda_nm, material), start, width)
 
 
 def lines(power: Power, plane: Plane, start: Array, lambda_nm: Array, width: float) -> Array:
-    """Frequencies (L,) of the lines nearest to `start` (L,): maxima of |P(f; s)|^2 at the s of the line itself."""
+    """Find frequencies (L,) of the lines near `start` (L,): maxima of |P(f; s)|^2 at the s of the line itself."""
     lambda_um = 1e-3 * lambda_nm[:, None]
     towards = -np.array([np.cos(plane.azimuth), np.sin(plane.azimuth)])
 
@@ -156,31 +157,31 @@ def _climb(values: Callable[[Array], Array], start: Array, width: float) -> Arra
     return f
 
 
-def walk(field: HeightField, sigma_um: float, s_per_um: float, f: Array, places: int) -> Array:
-    """|P(f; s)|^2 (places, places, 2, k) with the window on a grid of places of the patch, first along y, then x.
+def by_position(field: HeightField, sigma_um: float, s_per_um: float, f: Array, count: int) -> Array:
+    """Return |P(f; s)|^2 (count, count, 2, k) with the window at a grid of positions on the patch, along y, then x.
 
-    `f` (k,) is along x, met with the light at azimuth 0 and then at 180 degrees (P at -f and at f). The place [0, 0]
-    is sample 0, and [places // 2, places // 2] the middle where `places` is even.
+    `f` (k,) is along x, met with the light at azimuth 0 and then at 180 degrees (P at -f and at f). The position
+    [0, 0] is sample 0, and [count // 2, count // 2] the middle where `count` is even.
     """
     ny, nx = field.shape
     pitch_x, pitch_y = field.pitch_um
     p = np.exp(1j * s_per_um * field.centred().heights_um)
     along_y = folded_window(ny, pitch_y, sigma_um, 0.0).real
-    at_y = np.stack([np.roll(along_y, _sample(ny, i, places) - ny // 2) for i in range(places)])
+    at_y = np.stack([np.roll(along_y, _sample(ny, i, count) - ny // 2) for i in range(count)])
     waves = np.stack([folded_window(nx, pitch_x, sigma_um, sign * each) for sign in (-1, 1) for each in f])
     total = along_y.sum() * folded_window(nx, pitch_x, sigma_um, 0.0).real.sum()
     seen = at_y @ p
-    columns = [np.roll(seen, nx // 2 - _sample(nx, i, places), axis=1) @ waves.T for i in range(places)]
+    columns = [np.roll(seen, nx // 2 - _sample(nx, i, count), axis=1) @ waves.T for i in range(count)]
     power = np.abs(np.stack(columns, axis=1) / total) ** 2
-    return np.asarray(power.reshape(places, places, 2, len(f)))
+    return np.asarray(power.reshape(count, count, 2, len(f)))
 
 
-def _sample(samples: int, place: int, places: int) -> int:
-    return samples * place // places
+def _sample(samples: int, position: int, count: int) -> int:
+    return samples * position // count
 
 
 def phase_rate(plane: Plane, f: float, lambda_nm: float) -> float:
-    """s = k w, 1/um, negative, of a view at f."""
+    """Return s = k w, 1/um, negative, of a view at f."""
     lambda_um = 1e-3 * lambda_nm
     cosine = float(np.cos(plane.phi(np.array(f), np.array(lambda_um))))
     return -2.0 * pi / lambda_um * (cos(plane.theta_i) + cosine)

@@ -27,12 +27,12 @@ _THREADS = "OPENBLAS_NUM_THREADS"
 
 
 def cosine(x: Array) -> Array:
-    """A sinusoid between 0 and 1."""
+    """Return a sinusoid between 0 and 1."""
     return np.asarray(0.5 - 0.5 * np.cos(2.0 * pi * x))
 
 
 def sawtooth(x: Array) -> Array:
-    """A blaze rising towards +x from 0 to 1."""
+    """Return a blaze that rises towards +x from 0 to 1."""
     return x
 
 
@@ -45,7 +45,7 @@ class Shape:
     quoted: tuple[tuple[float, ...], ...]
 
     def power(self, s: Array, depth: Array) -> Array:
-        """|c_1|^2 at s = k w, depths from crest to valley."""
+        """Return |c_1|^2 at s = k w, depths from crest to valley."""
         if self.profile is cosine:
             return gratings.sinusoid(float(_ORDER), s, 0.5 * depth)
         return gratings.blaze(float(_ORDER), s, depth)
@@ -55,7 +55,7 @@ SHAPES = {"sinusoid": Shape(cosine, 24, scalar_domain.SMOOTH), "blaze": Shape(sa
 
 
 @dataclass(frozen=True)
-class Case:
+class GratingCase:
     """One grating of many depths."""
 
     shape: str
@@ -90,17 +90,17 @@ class Efficiencies:
         return self.scalar - self.rigorous
 
 
-def rigorous(case: Case, depths: Array) -> Array:
-    """TE and TM (2, depths) over the flat surface's reflectance of unpolarised light."""
+def rigorous(case: GratingCase, depths: Array) -> Array:
+    """Return TE and TM (2, depths) over the flat surface's reflectance of unpolarised light."""
     index, theta = INDICES[case.material], float(np.radians(case.theta_deg))
     shape = SHAPES[case.shape]
-    grating = coupled_wave.Grating(shape.profile, case.period, theta, index)
+    grating = coupled_wave.RigorousGrating(shape.profile, case.period, theta, index)
     found = coupled_wave.both_polarisations(grating, depths, shape.columns, _ORDER)
     return np.asarray(found / fresnel.reflectance(np.cos(theta), index))
 
 
-def scalar(case: Case, depths: Array) -> tuple[Array, Array]:
-    """Ours and |c_1|^2 (depths,): the BRDF over the order's lobe, R(half angle) |c_1|^2 G / w^2, over R(ti)."""
+def scalar(case: GratingCase, depths: Array) -> tuple[Array, Array]:
+    """Return R(half angle) |c_1|^2 G / w^2 over R(ti), the BRDF of the order's lobe, and |c_1|^2, (depths,) each."""
     wi = case.wi
     wr = gratings.view_of_order(wi, float(_ORDER), 1.0 / case.period)
     bare = SHAPES[case.shape].power(2.0 * pi * geometry.uvw(wi, wr)[2], depths)
@@ -109,8 +109,8 @@ def scalar(case: Case, depths: Array) -> tuple[Array, Array]:
     return reflected * gratings.efficiency(bare, wi, wr), bare
 
 
-def solve(case: Case, depths: Array) -> Efficiencies:
-    """Both sides of one case."""
+def solve(case: GratingCase, depths: Array) -> Efficiencies:
+    """Solve one case, rigorously and by the scalar model."""
     te, tm = rigorous(case, depths)
     return Efficiencies(te, tm, *scalar(case, depths))
 
@@ -132,8 +132,8 @@ def _one_thread_each() -> Iterator[None]:
             os.environ[_THREADS] = before
 
 
-def sweep(cases: Sequence[Case], depths: Array, progress: Progress) -> dict[Case, Efficiencies]:
-    """All cases, side by side, the longest first."""
+def sweep(cases: Sequence[GratingCase], depths: Array, progress: Progress) -> dict[GratingCase, Efficiencies]:
+    """Solve all cases in parallel processes, the longest first."""
     longest_first = sorted(cases, key=lambda case: -case.period)
     found = {}
     with _one_thread_each(), ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
@@ -150,26 +150,26 @@ class Sweep:
     periods: Sequence[float]
     depths: Sequence[float]
     thetas_deg: Sequence[float]
-    results: dict[Case, Efficiencies]
+    results: dict[GratingCase, Efficiencies]
 
-    def cases(self) -> list[Case]:
-        """Every shape and material in every light and period."""
-        return [Case(*each) for each in product(SHAPES, INDICES, self.thetas_deg, self.periods)]
+    def cases(self) -> list[GratingCase]:
+        """Return every shape and material in every light and period."""
+        return [GratingCase(*each) for each in product(SHAPES, INDICES, self.thetas_deg, self.periods)]
 
     def grid(self, shape: str, material: str, theta_deg: float, what: str) -> Array:
-        """One of the efficiencies, or the error, (depths, periods)."""
-        cases = [Case(shape, material, theta_deg, period) for period in self.periods]
+        """Return one of the efficiencies, or the error, (depths, periods)."""
+        cases = [GratingCase(shape, material, theta_deg, period) for period in self.periods]
         return np.stack([getattr(self.results[case], what) for case in cases], axis=1)
 
     def largest(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
-        """Largest size of something (depths, periods) over materials and lights."""
+        """Return the largest magnitude (depths, periods) over materials and lights."""
         cases = [[c for c in self.cases() if c.shape == shape and c.period == period] for period in self.periods]
         return np.stack(
             [np.max([np.abs(what(self.results[case])) for case in each], axis=0) for each in cases], axis=1
         )
 
     def by_class(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
-        """The same, largest of the periods from each of the table's on and of depths up to each, table's shape."""
+        """Return the same over periods from each of the table's on and depths up to each of them, in its shape."""
         errors, periods, depths = self.largest(shape, what), np.array(self.periods), np.array(self.depths)
         return np.array(
             [

@@ -16,7 +16,7 @@ from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Basis, Stack
 from pipeline.diffraction.reference import integrate
 from pipeline.diffraction.upload import upload
-from pipeline.evaluation.figures.figure import Surface
+from pipeline.evaluation.figures.page import BenchSurface
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.optics import brdf, geometry
 from pipeline.optics.light import trapezoid
@@ -31,11 +31,11 @@ _WINDOW_CUT = 1e-5
 class TaylorSeries:
     """sum_(n <= N) (i k w h)^n / n! ([D14] eq. 6), heights from -H to H as the stack has them."""
 
-    surface: Surface
+    surface: BenchSurface
     stack: Stack
 
     @classmethod
-    def centred(cls, surface: Surface, order: int) -> "TaylorSeries":
+    def centred(cls, surface: BenchSurface, order: int) -> "TaylorSeries":
         """About the heights' mid-range, as this project has them, up to an order."""
         return cls(surface, _stack(surface, "taylor", order))
 
@@ -64,7 +64,7 @@ class TaylorSeries:
 class ChebyshevSeries:
     """sum_(n <= N) (2 - [n = 0]) i^n J_n(k w H) T_n(h / H)."""
 
-    surface: Surface
+    surface: BenchSurface
     order: int
 
     @cached_property
@@ -79,7 +79,7 @@ class ChebyshevSeries:
         return integrate(power, rule, config.material, config.coherence.sigma_um, wi, wr)
 
 
-def _stack(surface: Surface, basis: Basis, order: int) -> Stack:
+def _stack(surface: BenchSurface, basis: Basis, order: int) -> Stack:
     config = surface.config
     reachable = 1e3 / config.light.lambda_min_nm
     return dft_stack.build(surface.field, basis, order + 1, config.coherence.sigma_um, reachable, _WINDOW_CUT)

@@ -1,1 +1,1 @@
-"""Every way of the literature from a height field to diffraction's colour, behind one interface."""
+"""The literature's algorithms from a height field to diffraction's colour, behind one interface."""

@@ -6,6 +6,11 @@ from pipeline.config.models import Config
 from pipeline.evaluation.methods.method import Maker, Method
 from pipeline.surface.heightfield import HeightField
 
+EXACT, OURS = "exact", "polar table"
+PAPER_REFERENCE, PAPER = "D14 reference", "D14 look-up"
+FLSS, NMM, PQ = "FLSS", "NMM", "PQ"
+STAM, BUMPS, GEMS = "Stam Gaussian", "Stam bumps", "GPU Gems"
+
 
 def _maker(module: str, name: str) -> Maker:
     def make(field: HeightField, config: Config) -> Method:
@@ -15,15 +20,16 @@ def _maker(module: str, name: str) -> Maker:
     return make
 
 
+# this project's own first, then from the nearest relative to the farthest
 METHODS: dict[str, Maker] = {
-    "FLSS": _maker("flss", "Flss"),
-    "NMM": _maker("nmm", "Nmm"),
-    "PQ": _maker("pq", "Pq"),
-    "D14 reference": _maker("paper_reference", "PaperReference"),
-    "D14 look-up": _maker("paper_look_up", "PaperLookUp"),
-    "Stam bumps": _maker("stam_bumps", "StamBumps"),
-    "Stam Gaussian": _maker("stam_gaussian", "StamGaussian"),
-    "GPU Gems": _maker("gems", "Gems"),
-    "exact": _maker("exact", "Exact"),
-    "polar table": _maker("polar_table", "PolarTableMethod"),
+    EXACT: _maker("exact", "Exact"),
+    OURS: _maker("polar_table", "PolarTableMethod"),
+    PAPER_REFERENCE: _maker("paper_reference", "PaperReference"),
+    PAPER: _maker("paper_look_up", "PaperLookUp"),
+    FLSS: _maker("flss", "Flss"),
+    NMM: _maker("nmm", "Nmm"),
+    PQ: _maker("pq", "Pq"),
+    STAM: _maker("stam_gaussian", "StamGaussian"),
+    BUMPS: _maker("stam_bumps", "StamBumps"),
+    GEMS: _maker("gems", "Gems"),
 }

@@ -6,12 +6,12 @@ its extremes (eq. 1.1), which the look-up undoes. Where this departs from the th
 - the patch's middle sample is the origin, not pixel 0, where the window's bright middle would lie on the patch's
   seam;
 - heights are centred at mid-range, which changes no intensity and halves the largest phase, so fewer terms do;
-- powers are of t = h / H. Eq. 1.1 takes any unit out of what is stored, so this changes the extremes only: of order
+- powers are of t = h / H. Eq. 1.1 removes any unit from stored values, so this changes the extremes only: of order
   1 instead of um^n, and no power leaves floating point's range;
 - the transform carries Stam's sign, exp(+2 pi i f.x), and is divided by the number of samples: a mirror gives 1;
 - only frequencies that light can reach, |f| <= 2 / lambda_min, are kept. Extremes are those of the whole transform.
 
-What eq. 1.1 costs: a term keeps 3e-8 of its extent, most of which is its value at f = 0, so coefficients far from the
+The price of eq. 1.1: a term keeps 3e-8 of its extent, most of which is its value at f = 0. Coefficients far from the
 mirror direction keep fewer digits than floats would. On *Elaphe*, 7e-6 of XYZ or of 1e-7 of a mirror's, in the mean.
 """
 
@@ -31,27 +31,27 @@ from pipeline.diffraction.device import require_device
 from pipeline.optics.coherence import reach_sigmas, sigma_f
 from pipeline.surface.heightfield import HeightField
 
-# of exp(i k w h) at the worst sample: what is left out of the Taylor series where no number of terms is given
+# of exp(i k w h) at the worst sample: the Taylor series' remainder where no number of terms is given
 SERIES_TOLERANCE = 1e-6
 _DIRECTIONS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """A reach of so many coefficients on either side of the anchor."""
+    """A reach of a number of coefficients on either side of the anchor."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Sigmas:
-    """A reach of at least so many sigma_f on either side of the position."""
+    """A reach of at least a number of sigma_f on either side of the position."""
 
     count: float
 
 
 Reach = Coefficients | Sigmas
-# what the published code takes, and [S14] 1.3.2's text; on 65 um = 4 sigma a sigma_f is 0.64 coefficients
+# the published code's reach, and that of [S14] 1.3.2's text; on 65 um = 4 sigma a sigma_f is 0.64 coefficients
 THREE_BY_THREE = Coefficients(1)
 FOUR_SIGMA = Sigmas(4.0)
 # the window's transform to 1e-6 of its peak
@@ -101,7 +101,7 @@ class Lookup:
     """|P|^2 from the terms of one height field by a neighbourhood around s(f) = f N dH ([S14] eq. 1.5-1.10)."""
 
     def __init__(self, field: HeightField, config: Config, terms: int | None, reach: Reach) -> None:
-        """`terms`: T + 1; None takes what leaves `SERIES_TOLERANCE` of exp(i k w h).
+        """`terms`: T + 1; None takes enough to leave `SERIES_TOLERANCE` of exp(i k w h).
 
         Raises DeviceError where no device works.
         """
@@ -133,7 +133,7 @@ class Lookup:
         )
 
     def at_pairs(self, weight: neighbourhood.Weight, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (pairs,) of `uvw` (pairs, 3) at `lambda_nm` (pairs,); NaN beyond the scan's band.
+        """Return |P|^2 (pairs,) of `uvw` (pairs, 3) at `lambda_nm` (pairs,); NaN beyond the Nyquist limits.
 
         Raises ValueError for wavelengths shorter than the config's.
         """
@@ -150,7 +150,7 @@ class Lookup:
         return power
 
     def power(self, weight: neighbourhood.Weight, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L) of every direction (directions, 3) at every wavelength (L,), as `at_pairs`."""
+        """Return |P|^2 (directions, L) of every direction (directions, 3) at every wavelength (L,), as `at_pairs`."""
         out = np.empty((len(uvw), len(lambda_nm)))
         for tile in tiles(len(uvw)):
             each, count = uvw[tile], len(lambda_nm)

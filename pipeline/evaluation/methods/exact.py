@@ -22,9 +22,9 @@ class Exact:
         return self._reference.stored_bytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return self._reference.xyz(self._config.light, self._config.material, wi, wr)
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L); NaN beyond the scan's band."""
+        """Return |P|^2 (directions, L); NaN beyond the Nyquist limits."""
         return self._reference.power(uvw, lambda_nm)

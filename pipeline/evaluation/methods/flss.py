@@ -10,7 +10,7 @@ where s passes a whole number: on 65 um = 4 sigma by up to 0.29 of a neighbour. 
 3 x 3 would err a quarter as much: on *Elaphe* 0.48 instead of 1.78 mean dE at 7500 RU, both at 5 nm.
 
 4 sigma_f are taken on either side, [D14] sec. 5's 3e-4, by the smallest such box: on 65 um 7 x 7, 4.7 sigma_f. Should
-[S14] 1.3.2 mean the whole width of the window instead, then 3 x 3, as wide as that, is what it asks for.
+[S14] 1.3.2 mean the whole width of the window instead, then it asks for 3 x 3, which is as wide as that.
 """
 
 from pipeline.arrays import Array
@@ -51,9 +51,9 @@ class Flss:
         return self._lookup.stored_bytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the scan's band."""
+        """Return |P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the Nyquist limits."""
         return self._lookup.power("gaussian", uvw, lambda_nm)
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return integrated(self.power, self._config, wi, wr, self._step_nm)

@@ -1,6 +1,6 @@
 """The diffraction shader of GPU Gems ch. 8 ([G04]): a grating of one spacing, a rainbow of three bumps, a highlight.
 
-It has no radiometry. Its colours, taken as linear sRGB with the highlight's peak at white, are what a display shows
+It has no radiometry. Its colours, taken as linear sRGB with the highlight's peak at white, are those of a display
 at the exposure that the config renders with; under 1 RU they are that much darker.
 """
 
@@ -63,7 +63,7 @@ class Gems:
         return 7 * np.dtype(float).itemsize
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return np.asarray(self._unit * self.rgb(wi, wr) @ SRGB_TO_XYZ.T)
 
     def rgb(self, wi: Array, wr: Array) -> Array:

@@ -1,8 +1,6 @@
-"""What every way to diffraction's colour offers: directions in, XYZ out, and what it costs."""
+"""The interface of every method: directions in, XYZ out, and the bytes that it stores."""
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -19,9 +17,9 @@ PUBLISHED_STEP_NM = 5.0
 
 
 class Method(Protocol):
-    """One way to the colour of one height field under one config's light and material.
+    """A method for the colour of one height field under one config's light and material.
 
-    source: where it is described. stored_bytes: of what it precomputed and keeps for its look-ups.
+    source: its publication. stored_bytes: of the data that it precomputes and keeps for its look-ups.
     """
 
     @property
@@ -31,35 +29,20 @@ class Method(Protocol):
     def stored_bytes(self) -> int: ...
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         ...
 
 
 @runtime_checkable
 class Monochromatic(Method, Protocol):
-    """A method that answers for one wavelength as well."""
+    """A method that answers for single wavelengths as well."""
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the scan's band."""
+        """Return |P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the Nyquist limits."""
         ...
 
 
 Maker = Callable[[HeightField, Config], Method]
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """A method made ready, and the seconds that took."""
-
-    method: Method
-    seconds: float
-
-
-def prepare(make: Maker, field: HeightField, config: Config) -> Prepared:
-    """Makes a method, timed."""
-    started = time.perf_counter()
-    method = make(field, config)
-    return Prepared(method, time.perf_counter() - started)
 
 
 def integrated(
@@ -74,7 +57,7 @@ def integrated(
 def monochromatic_brdf(method: Monochromatic, config: Config, wi: Array, wr: Array, lambda_nm: Array) -> Array:
     """f_l (directions, L) at single wavelengths in the config's normalisation ([D14] eq. 2 or 4).
 
-    In 1/sr for `absolute`. What lies beyond the scan's band is NaN.
+    In 1/sr for `absolute`. NaN beyond the Nyquist limits.
     """
     material, light = config.material, trapezoid(config.light, PUBLISHED_STEP_NM)
     single = Quadrature(lambda_nm, np.ones((len(lambda_nm), 3)))

@@ -1,8 +1,8 @@
 """NMM of [S14] 1.5.2: only the wavelengths whose frequency lands on a DFT coefficient.
 
-Coefficients stand at f = n / X, X = N dH the patch's width. A direction with (u, v) passes f = u / lambda, so
+Coefficients lie at f = n / X, X = N dH the patch's width. A direction with (u, v) passes f = u / lambda, so
 lambda_n = X |u| / n, n from X |u| / lambda_max to X |u| / lambda_min, is a set of wavelengths along u, and X |v| / n
-one along v. ([S14] writes dH, the pixel's size, where the patch's width must stand: with a pixel of 0.1 um no n would
+one along v. ([S14] writes dH, the pixel's size, where the patch's width is meant: with a pixel of 0.1 um no n would
 be left.) |P|^2 there is FLSS's.
 
 [S14] sums over both sets and notes that they are not even. Here both are joined and each wavelength counts for the
@@ -64,7 +64,7 @@ def _along_axis(path_nm: Array, range_nm: tuple[float, float]) -> tuple[NDArray[
 
 
 def _shares(direction: NDArray[np.int64], lambda_nm: Array, range_nm: tuple[float, float]) -> Array:
-    """What lies between the midpoints to both neighbours, or to an end of the range."""
+    """Distance between the midpoints to both neighbours, or to an end of the range."""
     between = 0.5 * (lambda_nm[1:] + lambda_nm[:-1])
     same = direction[1:] == direction[:-1]
     below = np.concatenate([[range_nm[0]], np.where(same, between, range_nm[0])])[: len(lambda_nm)]
@@ -105,7 +105,7 @@ class Nmm:
         return self._lookup.stored_bytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         out = np.empty((len(wr), 3))
         for tile in tiles(len(wr)):
             power = self._spread(-wi[tile] - wr[tile])
@@ -116,13 +116,13 @@ class Nmm:
         return out
 
     def _spread(self, uvw: Array) -> Array:
-        """|P|^2 (directions, L) on the grid of the colour weights, holding what the wavelengths selected give.
+        """|P|^2 (directions, L) on the grid of the colour weights, holding the power at the selected wavelengths.
 
         [S14] interpolates colour weights linearly between whole nanometres; spreading a value over both with the same
         shares gives the same sum.
         """
         chosen = landing(uvw[:, :2], self._size_um, self._config.light.range_nm)
-        # what lies beyond the scan's band adds nothing
+        # wavelengths beyond the Nyquist limits add nothing
         power = np.nan_to_num(self._lookup.at_pairs("gaussian", uvw[chosen.direction], chosen.lambda_nm))
         nodes = self._quadrature.lambda_nm
         cell_nm = np.gradient(nodes)

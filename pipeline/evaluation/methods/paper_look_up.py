@@ -36,5 +36,5 @@ class PaperLookUp:
         return self._table.values.nbytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return self._look_up(wi, wr)

@@ -23,8 +23,8 @@ TOLERANCE = 1e-3
 class PaperReference:
     """sum_n (i k w)^n / n! F_n(u / lambda, v / lambda), F_n gathered for every direction and wavelength.
 
-    With as many terms as its tolerance asks for, the window's cut at 4 sigma_f and the wavelength step are what parts
-    it from the exact reference.
+    With as many terms as its tolerance asks for, it differs from the exact reference by the window's cut at 4 sigma_f
+    and the wavelength step.
     """
 
     source = "[D14] sec. 5, reference shader"
@@ -45,11 +45,11 @@ class PaperReference:
         return self._stack.coefficients.nbytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return integrated(self.power, self._config, wi, wr)
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L); NaN beyond the scan's band."""
+        """Return |P|^2 (directions, L); NaN beyond the Nyquist limits."""
         out = np.empty((len(uvw), len(lambda_nm)))
         for first in range(0, len(lambda_nm), 3):
             three = lambda_nm[first : first + 3]

@@ -21,8 +21,8 @@ from pipeline.tables.polar.spectral import SpectralTable
 class PolarTableMethod:
     """XYZ from rings and azimuths of splines; |P|^2 from the spectral form, which is made when first asked for.
 
-    Of a larger scan it shows the window in the middle, as every method here does. What a config's [scene] does not
-    reach is NaN.
+    Of a larger scan it shows the window in the middle, as every method here does. Directions outside a
+    config's [scene] are NaN.
     """
 
     source = "this project: polar power spectrum, integrated ring by ring"
@@ -47,11 +47,11 @@ class PolarTableMethod:
         return self._spectral.values.nbytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return self._look_up(wi, wr)
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L); NaN beyond the scan's band."""
+        """Return |P|^2 (directions, L); NaN beyond the Nyquist limits."""
         found = spectral.look_up(self._spectral, uvw, lambda_nm)
         return np.where(in_band(self._field, uvw, 1e-3 * lambda_nm), found, np.nan)
 

@@ -2,16 +2,16 @@
 
 FLSS with two changes: the neighbourhood is weighed by a sinc, and P multiplied by pq = (p^2 + q^2)^(1/2), eq. 1.15.
 That part of [S14] points to its theory's chapter for the sinc and for p and q; the chapter is not among the sources
-here. What is taken, and why:
+here. The choices made, and their reasons:
 
-- A patch of width X that stands n times side by side has the transform of one patch times the geometric series
+- A patch of width X, repeated n times side by side, has the transform of one patch times the geometric series
   sum_(m < n) exp(2 pi i m f X). That complex number is p + i q, so pq is its modulus, here divided by n:
   |sin(pi n f X) / (n sin(pi f X))|. Along two axes the series multiply, and so do their moduli.
 - One patch is a box X wide, so its transform between the coefficients f_k = k / X is sum_k F_k sinc((f - f_k) X)
   along each axis: the sampling theorem, domains exchanged. sinc(d) = sin(pi d) / (pi d), as footnote 31 multiplies
   the distance by pi. A sinc of the distance in the plane would not interpolate, so it is one factor an axis.
 
-Together they are the transform of n x n patches under a box instead of a Gaussian. Beside every order stand the side
+Together they are the transform of n x n patches under a box instead of a Gaussian. Next to every order are the side
 lobes of the box, two patches are dark at every half coefficient, and along wavelengths these are colour fringes,
 which steps of 5 nm no longer follow: on *Elaphe* they cost 1.7 mean dE at 7500 RU where FLSS's cost 0.26. At a
 coefficient's own frequency sinc = pq = 1 and |P|^2 = |F_k|^2; a mirror gives 1.
@@ -48,7 +48,7 @@ class Pq:
         reach: Reach = FOUR_SIGMA,
         step_nm: float = PUBLISHED_STEP_NM,
     ) -> None:
-        """`patches`: how often the patch stands along (x, y); None takes as many as 4 sigma hold, at least two.
+        """`patches`: repetitions of the patch along (x, y); None takes as many as 4 sigma hold, at least two.
 
         `terms`: T + 1 of alg. 1; None takes enough for 1e-6 of exp(i k w h).
 
@@ -64,7 +64,7 @@ class Pq:
         return self._lookup.stored_bytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the scan's band."""
+        """Return |P|^2 (directions, L), 1 of a mirror in its own reflection; NaN beyond the Nyquist limits."""
         power = self._lookup.power("sinc", uvw, lambda_nm)
         for axis, (count, size) in enumerate(zip(self._patches, self._size_um, strict=True)):
             f = uvw[:, axis, None] / (1e-3 * lambda_nm)
@@ -72,7 +72,7 @@ class Pq:
         return power
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return integrated(self.power, self._config, wi, wr, self._step_nm)
 
 

@@ -6,7 +6,7 @@ epsilon: an order counts where both u dx / lambda and v dy / lambda are within e
 keeps its height, so a mirror stays 1, and `matched_epsilon` is the bound at which its area is the window's too.
 
 The colour follows the text. One delta function picks wavelengths, lambda = u dx / n; those count whose v dy / lambda
-is within epsilon of a whole number m. A picked wavelength stands for all that the bound lets through, which is
+is within epsilon of a whole number m. A picked wavelength represents all that the bound lets through, which is
 the delta's width in frequency times |d lambda / d(u / lambda)| = lambda^2 / |u|:
 
     2 epsilon / dx * lambda^2 / |u| = 2 epsilon lambda / n.
@@ -143,7 +143,7 @@ class StamBumps:
         return 6 * np.dtype(float).itemsize
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         config, quadrature = self._config, trapezoid(self._config.light, STEP_NM)
         # of a laser there are no wavelengths to pick from
         power = self.power if len(quadrature.lambda_nm) == 1 else self._picked
@@ -169,7 +169,7 @@ class StamBumps:
         return np.asarray(np.abs(self.bump.coefficients(n, m, 2.0 * pi * w_per_um)) ** 2)
 
     def _picked(self, uvw: Array, lambda_nm: Array) -> Array:
-        """What |P|^2 at a trapezoidal rule's nodes (directions, L) must be for its sum to be the picked light's."""
+        """|P|^2 (directions, L) at the nodes of a trapezoidal rule whose sum is the picked light."""
         per_um = 1e3 / lambda_nm
         specular = np.ones((len(uvw), len(lambda_nm)), bool)
         for axis, period in enumerate(self.periods_um):
@@ -192,7 +192,7 @@ class StamBumps:
         um, first, second = picked_um[row, which], np.sign(uvw[row, axis]) * n[which], near[row, which]
         orders = (first, second) if axis == 0 else (second, first)
         light = self._efficiency(orders[0], orders[1], uvw[row, 2] / um)
-        # what both delta functions find counts half each time
+        # an order that both delta functions find counts half each time
         width_nm = 2e3 * self.epsilon * um / n[which] * np.where(second == 0.0, 1.0, 0.5)
         _deposit(total, row, 1e3 * um, light * width_nm, lambda_nm)
 

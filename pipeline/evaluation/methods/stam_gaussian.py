@@ -34,7 +34,7 @@ from pipeline.surface.heightfield import HeightField
 
 # [D14] sec. 6.3: the circular aperture of 100 um before the laser
 PUBLISHED_DISC_RADIUS_UM = 50.0
-# of the mirror's peak: what the terms left out may add to E|P|^2
+# of the mirror's peak: the share of the omitted terms in E|P|^2
 _TOLERANCE = 1e-10
 # of its peak: where a window's |transform|^2 is cut about each coefficient but the specular one, which is never cut.
 # A Gaussian's falls steeply; a disc's falls with the cube, and its tails are left out of the diffuse light alone
@@ -43,7 +43,7 @@ _PAIRS_AT_ONCE = 50_000
 
 
 class Window(Protocol):
-    """What light is coherent over.
+    """The window over which light is coherent.
 
     sigma_um: of the Gaussian window with the same effective area, 4 pi sigma^2 = (integral of g)^2 / integral of g^2.
     reach_per_um: how far from its peak the |transform|^2 is followed.
@@ -175,7 +175,7 @@ class GaussianSurface:
         return self._diffuse.nbytes + self._specular.nbytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """E|P|^2 (directions, L); NaN beyond the scan's band."""
+        """Return E|P|^2 (directions, L); NaN beyond the Nyquist limits."""
         per_um = 1e3 / np.asarray(lambda_nm, float)
         fx, fy, f_w = (np.multiply.outer(uvw[:, axis], per_um).ravel() for axis in range(3))
         out = np.full(len(fx), np.nan)
@@ -224,11 +224,11 @@ class StamGaussian:
         return self._surface.stored_bytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return integrated(self.power, self._config, wi, wr)
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """E|P|^2 (directions, L); NaN beyond the scan's band."""
+        """Return E|P|^2 (directions, L); NaN beyond the Nyquist limits."""
         return self._surface.power(uvw, lambda_nm)
 
 

@@ -1,4 +1,4 @@
-"""BRDF maps in sheets, curves beside them, and methods by what they cost."""
+"""BRDF maps in sheets, and methods by run time and error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from pipeline.accuracy.plots import png
+from pipeline.evaluation.plots.charts import plain_numbers
 
 _INK, _GROUND, _DIM = "#f2f2f2", "#000000", "#9a9a9a"
 _CELL_IN, _GAP_IN, _TITLE_IN, _NOTE_IN, _HEAD_IN, _LEFT_IN = 2.6, 0.16, 0.5, 0.24, 0.5, 0.42
-# Okabe and Ito 2008: told apart by people who confuse red and green as well
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ class Panel:
 
 
 def sheet(rows: Sequence[Sequence[Panel]], heading: str, row_names: Sequence[str] = ()) -> bytes:
-    """Maps of equal size on black, row by row, under a heading; `row_names` stand beside the rows. PNG."""
+    """Draw maps of equal size on black, row by row, under a heading; `row_names` to their left. PNG."""
     left = _LEFT_IN if row_names else _GAP_IN
     words = [_TITLE_IN if any(panel.title for panel in row) else _NOTE_IN for row in rows]
     width = left + max(len(row) for row in rows) * (_CELL_IN + _GAP_IN)
@@ -49,7 +47,7 @@ def sheet(rows: Sequence[Sequence[Panel]], heading: str, row_names: Sequence[str
 
 
 def _draw_map(axes: Any, panel: Panel) -> None:
-    """The map in the unit disc, its rim drawn, its words above."""
+    """The map in the unit disc, its rim drawn, its titles above."""
     axes.imshow(panel.pixels, extent=(-1, 1, -1, 1), interpolation="antialiased")
     axes.add_patch(Circle((0, 0), 1.0, fill=False, color="#4a4a4a", linewidth=0.6))
     axes.set(xlim=(-1.01, 1.01), ylim=(-1.01, 1.01))
@@ -59,83 +57,8 @@ def _draw_map(axes: Any, panel: Panel) -> None:
 
 
 @dataclass(frozen=True)
-class Line:
-    """A curve of a chart; style as Matplotlib's format strings have it."""
-
-    label: str
-    x: Sequence[float]
-    y: Sequence[float]
-    colour: str
-    style: str = "o-"
-
-
-@dataclass(frozen=True)
-class Chart:
-    """Axes of curves. marks: (x, label) of vertical lines; level: (y, label) of a horizontal one."""
-
-    title: str
-    x_label: str
-    y_label: str
-    lines: Sequence[Line]
-    x_scale: str = "linear"
-    y_scale: str = "log"
-    marks: Sequence[tuple[float, str]] = ()
-    level: tuple[float, str] | None = None
-    floor: float = 1e-5
-
-
-def charts(panels: Sequence[Chart], height_in: float = 3.7) -> bytes:
-    """Charts side by side, PNG."""
-    figure = Figure(figsize=(4.1 * len(panels), height_in), layout="constrained")
-    for axes, chart in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
-        _draw_chart(axes, chart)
-    return png(figure)
-
-
-def _draw_chart(axes: Any, chart: Chart) -> None:
-    for line in chart.lines:
-        # what is below the floor is drawn on it, not off a logarithmic axis
-        y = np.maximum(line.y, chart.floor) if chart.y_scale == "log" else line.y
-        axes.plot(line.x, y, line.style, color=line.colour, label=line.label, linewidth=1.4, markersize=4.5)
-    axes.set(xscale=chart.x_scale, yscale=chart.y_scale)
-    for axis, scale in ((axes.xaxis, chart.x_scale), (axes.yaxis, chart.y_scale)):
-        if scale == "log":
-            _plain_numbers(axis)
-        else:
-            axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    axes.set(xlabel=chart.x_label, ylabel=chart.y_label)
-    axes.set_title(chart.title, fontsize=11)
-    for x, label in chart.marks:
-        axes.axvline(x, color="0.45", linestyle="--", linewidth=0.9)
-        axes.text(x, 0.015, f" {label}", transform=axes.get_xaxis_transform(), fontsize=7.5, color="0.3")
-    if chart.level is not None:
-        axes.axhline(chart.level[0], color="0.45", linestyle=":", linewidth=1.0)
-        axes.text(
-            0.99,
-            chart.level[0],
-            chart.level[1],
-            transform=axes.get_yaxis_transform(),
-            fontsize=7.5,
-            color="0.3",
-            ha="right",
-            va="bottom",
-        )
-    axes.grid(alpha=0.2, which="major")
-    axes.legend(fontsize=8, framealpha=0.9)
-
-
-def _plain_numbers(axis: Any) -> None:
-    """Ticks of a logarithmic axis as numbers, at 1, 2 and 5 where it spans less than two decades."""
-    low, high = axis.get_view_interval()
-    if high < 100.0 * low:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-@dataclass(frozen=True)
 class Cost:
-    """One way to a map: seconds of the map alone and with its preparation, its mean error, and its colour."""
+    """A method's cost: seconds of the map alone and with its preparation, its mean error, and its colour."""
 
     name: str
     map_s: float
@@ -145,7 +68,7 @@ class Cost:
 
 
 def costs(points: Sequence[Cost], error_label: str, title: str, reference: tuple[float, str]) -> bytes:
-    """Time against error, PNG: filled with preparation, hollow without.
+    """Draw time against error, PNG: filled with preparation, hollow without.
 
     reference: seconds and name of what has no error, a vertical line.
     """
@@ -177,14 +100,14 @@ def costs(points: Sequence[Cost], error_label: str, title: str, reference: tuple
     axes.set(ylim=(0.5 * min(errors), 2.0 * max(errors)))
     axes.set(xlabel="seconds", ylabel=error_label, title=title)
     for axis in (axes.xaxis, axes.yaxis):
-        _plain_numbers(axis)
+        plain_numbers(axis)
     axes.grid(alpha=0.2, which="major")
     axes.legend(loc="center left", fontsize=9)
     return png(figure)
 
 
 def _free(placed: Sequence[tuple[float, float]], point: Cost) -> tuple[float, float]:
-    """Where a label may stand, as powers of ten: right of its point, above labels that stand there already."""
+    """Position of a label, as powers of ten: right of its point, above labels that are there already."""
     x, y = np.log10(point.total_s) + 0.06, np.log10(point.error)
     while any(abs(x - other_x) < 1.0 and abs(y - other_y) < 0.13 for other_x, other_y in placed):
         y += 0.14

@@ -1,7 +1,6 @@
-"""What a screen shows by each method, how far that is from the exact image, and its rows as curves."""
+"""Images of a screen by each method, and their errors."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -13,12 +12,10 @@ from pipeline.arrays import Array
 from pipeline.optics.colour import delta_e, pixels
 
 _ERRORS = (0.01, 100.0)
-# Okabe and Ito 2008
-_COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7")
 
 
 def sheet(truth: Array, images: Mapping[str, Array], side_mm: float, dim_ru: float, bright_ru: float) -> bytes:
-    """XYZ images (pixels, pixels, 3) at two exposures beside the exact one, and their errors at the brighter."""
+    """Draw XYZ images (pixels, pixels, 3) and the exact one at two exposures, with errors at the brighter; PNG."""
     columns = {"exact": truth, **images}
     figure = Figure(figsize=(2.75 * len(columns), 8.4), layout="constrained")
     panels = figure.subplots(3, len(columns), sharex=True, sharey=True)
@@ -43,17 +40,4 @@ def sheet(truth: Array, images: Mapping[str, Array], side_mm: float, dim_ru: flo
     bar.ax.yaxis.set_ticks_position("left")
     bar.ax.yaxis.set_label_position("left")
     bar.set_label(f"ΔE*ab (1976) at {bright_ru:g} RU")
-    return png(figure)
-
-
-def profiles(rows: Mapping[str, Array], axis_mm: Array) -> bytes:
-    """Mean Y of each row (pixels,), from the top, as curves over the height on the screen."""
-    figure = Figure(figsize=(8.6, 4.2), layout="constrained")
-    axes = figure.subplots()
-    for (name, values), colour in zip(rows.items(), _COLOURS, strict=False):
-        thick: dict[str, Any] = {"linewidth": 3.0, "alpha": 0.35} if name == "exact" else {"linewidth": 1.3}
-        axes.plot(axis_mm[::-1], values, color=colour, label=name, **thick)
-    axes.set(yscale="log", xlabel="y on the screen (mm)", ylabel="mean Y of the row under 1 RU")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=9)
     return png(figure)

@@ -6,8 +6,8 @@ import pytest
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import energy
-from pipeline.evaluation.figures.figure import Bench, Surface
 from pipeline.evaluation.figures.order_efficiencies import LAMBDA_MIN_NM, known_gratings
+from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.methods.exact import Exact
 from pipeline.evaluation.methods.polar_table import PolarTableMethod
 from pipeline.optics.material import Material
@@ -22,12 +22,12 @@ SIGMA = 8.0
 FLAT = HeightField(np.zeros((8, 16)), (2.0, 2.0))
 
 
-def small(kind: str, sigma_um: float = 4.8, pitch_um: float = 0.15) -> Surface:
+def small(kind: str, sigma_um: float = 4.8, pitch_um: float = 0.15) -> BenchSurface:
     """A surface of a recipe, 19.2 um wide."""
     recipe = {"kind": kind, "size_um": 19.2, "pitch_um": pitch_um}
     settings = {"name": kind, "surface": {"recipe": recipe}, "coherence": {"sigma_um": sigma_um}}
     config = Config.model_validate(settings)
-    return Surface(config, recipes.make(config.surface.recipe), scan=False)
+    return BenchSurface(config, recipes.make(config.surface.recipe), scan=False)
 
 
 @pytest.mark.parametrize("grating", known_gratings(), ids=lambda grating: grating.name)
@@ -60,18 +60,18 @@ def test_long_periods_keep_their_energy() -> None:
         assert energy.closed_albedo(grating, np.array([0.3]), 60.0)[0] == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.parametrize("way", [Exact, pytest.param(PolarTableMethod, marks=pytest.mark.slow)])
-def test_light_and_view_may_change_places(way) -> None:
+@pytest.mark.parametrize("method", [Exact, pytest.param(PolarTableMethod, marks=pytest.mark.slow)])
+def test_light_and_view_may_be_exchanged(method) -> None:
     surface = small("elaphe")
     gold = Material(fresnel="conductor", normalisation="absolute")
     wi, wr = energy.pairs(40)
-    method = way(surface.field, surface.config.model_copy(update={"material": gold}))
-    assert np.max(method.xyz(wi, wr)) > 0.0
-    assert energy.asymmetry(method, wi, wr) < 1e-10
+    gilded = method(surface.field, surface.config.model_copy(update={"material": gold}))
+    assert np.max(gilded.xyz(wi, wr)) > 0.0
+    assert energy.asymmetry(gilded, wi, wr) < 1e-10
 
 
 def test_asymmetry_sees_a_brdf_that_is_not_reciprocal() -> None:
-    """Radiance itself holds cos(ti) beside the BRDF."""
+    """Radiance itself holds cos(ti) as a factor of the BRDF."""
 
     class Lambertian:
         source, stored_bytes = "a diffuse surface lit by radiance, not irradiance", 0
@@ -85,7 +85,7 @@ def test_asymmetry_sees_a_brdf_that_is_not_reciprocal() -> None:
 @pytest.mark.slow
 def test_the_page_holds() -> None:
     bench = Bench(small("blazed", 16.25), small("elaphe"), small("xenopeltis", pitch_um=0.1), quick=True)
-    figure = energy.make(bench, silent)
-    assert [check.what for check in figure.checks if check.holds is False] == []
-    assert sum(check.holds is True for check in figure.checks) > 10
-    assert figure.pictures[0].png.startswith(b"\x89PNG")
+    page = energy.make(bench, silent)
+    assert [check.id for check in page.checks if check.verdict == "misses"] == []
+    assert sum(check.verdict == "holds" for check in page.checks) > 10
+    assert page.pictures[0].png.startswith(b"\x89PNG")

@@ -8,9 +8,9 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
-from pipeline.evaluation.figures import map_physics, method_traits
-from pipeline.evaluation.figures.exact_maps import NORMAL, blazed_recipe, directions, lit_views, reference
-from pipeline.evaluation.figures.figure import Bench, Surface
+from pipeline.evaluation.figures import map_physics, method_traits, planes
+from pipeline.evaluation.figures.maps import NORMAL, blazed_recipe, directions, lit_views
+from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.figures.truncated_series import ChebyshevSeries, TaylorSeries
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.paper_look_up import PaperLookUp
@@ -26,7 +26,7 @@ VIEWS = Map(61, 0.98)
 PAGES = ("brdf_maps", "grids", "terms", "coherence_length", "wavelength_step", "methods_sheet", "costs")
 
 
-def surface(kind: str, light: dict[str, object] | None = None, **recipe: object) -> Surface:
+def surface(kind: str, light: dict[str, object] | None = None, **recipe: object) -> BenchSurface:
     made = {"kind": kind, "size_um": SIZE_UM, "pitch_um": PITCH_UM, **recipe}
     config = Config.model_validate(
         {
@@ -39,7 +39,7 @@ def surface(kind: str, light: dict[str, object] | None = None, **recipe: object)
         }
     )
     assert config.surface.recipe is not None
-    return Surface(config, recipes.make(config.surface.recipe), scan=False)
+    return BenchSurface(config, recipes.make(config.surface.recipe), scan=False)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def bench() -> Bench:
     return Bench(surface("blazed"), surface("elaphe"), surface("xenopeltis"), quick=True)
 
 
-def truncated_power(of: Surface, lowest_um: float, order: int, uvw: np.ndarray, lambda_um: float) -> np.ndarray:
+def truncated_power(of: BenchSurface, lowest_um: float, order: int, uvw: np.ndarray, lambda_um: float) -> np.ndarray:
     """|P|^2 of the Taylor series cut after `order`, heights counted from `lowest_um`, summed sample by sample."""
     field, sigma = of.field, of.config.coherence.sigma_um
     (ny, nx), (px, py) = field.shape, field.pitch_um
@@ -90,7 +90,7 @@ def test_all_series_end_at_the_reference(bench: Bench) -> None:
     views = Map(15, 0.98)
     wi, wr = directions(views, NORMAL)
     config = bench.elaphe.config
-    exact = reference(bench.elaphe, silent).xyz(config.light, config.material, wi, wr, 5.0)
+    exact = bench.elaphe.reference().xyz(config.light, config.material, wi, wr, 5.0)
     taylor, chebyshev = TaylorSeries.centred(bench.elaphe, 39), ChebyshevSeries(bench.elaphe, 19)
     for found in (taylor.xyz(24, wi, wr), taylor.raised().xyz(39, wi, wr), chebyshev.xyz(19, wi, wr)):
         np.testing.assert_allclose(found, exact, rtol=1e-3, atol=1e-7)
@@ -104,22 +104,20 @@ def test_the_blaze_is_the_reference_in_closed_form(bench: Bench) -> None:
     """sinc^2(m - |w| h / lambda) under the window, against the sum over 25 samples a period."""
     recipe, config = blazed_recipe(bench), bench.blazed.config
     x = np.linspace(-0.6, 0.6, 61)
-    wr = np.stack([x, np.zeros_like(x), np.sqrt(1.0 - x**2)], axis=-1)
-    exact = Reference(bench.blazed.field, SIGMA_UM, 380.0).xyz(
-        config.light, config.material, np.tile([0.0, 0.0, 1.0], (61, 1)), wr
-    )[:, 1]
+    wi, wr = planes.under_normal_light(x)
+    exact = bench.blazed.reference().xyz(config.light, config.material, wi, wr)[:, 1]
     closed = map_physics.blazed_luminance(config, recipe, wr)
     assert np.max(np.abs(closed - exact)) < 5e-3 * np.max(exact)
 
 
-def test_orders_stand_where_the_grating_equation_has_them() -> None:
+def test_orders_lie_where_the_grating_equation_has_them() -> None:
     grating = surface("sinusoid", period_um=2.5, axis="y")
     exact = Reference(grating.field, SIGMA_UM, 380.0)
-    expected, found = map_physics.order_places(exact, SIGMA_UM, 2.5, 600.0, (-2, -1, 1, 2))
+    expected, found = map_physics.order_sines(exact, SIGMA_UM, 2.5, 600.0, (-2, -1, 1, 2))
     np.testing.assert_allclose(expected, [-0.48, -0.24, 0.24, 0.48])
     np.testing.assert_allclose(found, expected, atol=1e-3)
     # a wrong period is seen: the peak lies at the end of where it is looked for, or elsewhere
-    _, wrong = map_physics.order_places(exact, SIGMA_UM, 2.6, 600.0, (1, 2))
+    _, wrong = map_physics.order_sines(exact, SIGMA_UM, 2.6, 600.0, (1, 2))
     assert np.all(np.abs(wrong - np.array([0.6, 1.2]) / 2.6) > 1e-3)
 
 
@@ -152,9 +150,9 @@ def test_bands_and_their_contrast() -> None:
 def test_oscillation_is_that_of_a_known_ripple() -> None:
     x = np.linspace(0.3, 0.95, 1301)
     ripple = 1.0 + 0.2 * np.sin(2.0 * np.pi * x / 0.008)
-    line = method_traits.Line(x, {"ripple": ripple * np.exp(-x), "plain": np.exp(-x)})
-    assert method_traits.oscillation(line, "ripple") == pytest.approx(0.2 / np.sqrt(2.0), rel=0.02)
-    assert method_traits.oscillation(line, "plain") < 1e-3
+    profile = method_traits.Profile(x, {"ripple": ripple * np.exp(-x), "plain": np.exp(-x)})
+    assert method_traits.oscillation(profile, "ripple") == pytest.approx(0.2 / np.sqrt(2.0), rel=0.02)
+    assert method_traits.oscillation(profile, "plain") < 1e-3
 
 
 def test_black_views_are_not_lit() -> None:
@@ -164,28 +162,34 @@ def test_black_views_are_not_lit() -> None:
 
 # --- pages -------------------------------------------------------------------------------------------
 
-# what holds at any window and size: closed forms and symmetries
+# checks that hold at any window and size: closed forms and symmetries
 ALWAYS = {
-    "brdf_maps": ("blazed: luminance", "CD: orders", "Elaphe: luminance"),
-    "terms": ("Xenopeltis at N = 1", "smallest N", "the N that", "all surfaces"),
-    "coherence_length": ("the first order's line", "purity"),
-    "wavelength_step": ("the reference's own step",),
-    "methods_sheet": ("FLSS", "NMM", "GPU Gems", "Stam's Gaussian surface on Elaphe: difference"),
+    "brdf_maps": ("blazed.luminance", "cd.tracks", "elaphe.horizontal"),
+    "terms": ("modes.first", "all.chebyshev", "all.centring", "all.bound", "all.raised"),
+    "coherence_length": ("line.width", "colour.purity"),
+    "wavelength_step": ("reference.step",),
+    "methods_sheet": (
+        *("flss.blazed", "flss.elaphe", "nmm.white", "nmm.exact"),
+        *("gems.even", "gems.exact", "gaussian.even", "gaussian.exact"),
+    ),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_every_page_is_whole(bench: Bench, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its numbers are for machines, its tables even, its pictures PNGs; and closed forms hold on a small patch."""
+    """Its document is JSON, its ids are unique, its pictures PNGs; and closed forms hold on a small patch."""
     monkeypatch.setitem(METHODS, "D14 look-up", lambda field, config: PaperLookUp(field, config, resolution=51))
-    figure = import_module(f"pipeline.evaluation.figures.{name}").make(bench, silent)
-    assert figure.name == name
-    assert figure.pictures
-    json.dumps(figure.numbers, allow_nan=False)
-    assert all(picture.png.startswith(b"\x89PNG") for picture in figure.pictures)
-    assert all(len(row) == len(table.columns) for table in figure.tables for row in table.rows)
-    for start in ALWAYS.get(name, ()):
-        held = [check.holds for check in figure.checks if check.what.startswith(start)]
-        assert held, f"no check begins with {start!r}"
-        assert all(held), [check for check in figure.checks if check.what.startswith(start)]
+    page = import_module(f"pipeline.evaluation.figures.{name}").make(bench, silent)
+    assert page.name == name
+    assert page.pictures
+    assert all(picture.png.startswith(b"\x89PNG") for picture in page.pictures)
+    document = page.document()
+    json.dumps(document, allow_nan=False)
+    assert len(document["tables"]) == len(page.tables)
+    for table in page.tables:
+        assert len(set(table.headings)) == len(table.headings)
+        assert all(len(texts) == len(table.columns) for texts in table.texts)
+    checks = {check.id: check for check in page.checks}
+    assert len(checks) == len(page.checks)
+    assert {key: checks[key].verdict for key in ALWAYS.get(name, ())} == dict.fromkeys(ALWAYS.get(name, ()), "holds")

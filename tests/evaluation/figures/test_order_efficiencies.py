@@ -7,15 +7,15 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.evaluation.figures import order_efficiencies
-from pipeline.evaluation.figures.figure import Bench, Surface
-from pipeline.evaluation.figures.order_efficiencies import Answers, Grating, known_gratings
+from pipeline.evaluation.figures.order_efficiencies import Answers, KnownGrating, known_gratings
+from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.progress import silent
 from pipeline.surface import recipes
 
 pytestmark = pytest.mark.physics
 
 SIGMA = 8.0
-AT = order_efficiencies.places(np.array([430.0, 650.0]))
+AT = order_efficiencies.propagating(np.array([430.0, 650.0]))
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def found() -> dict[str, Answers]:
 
 
 @pytest.mark.parametrize("grating", known_gratings(), ids=lambda grating: grating.name)
-def test_every_route_meets_the_closed_form(found: dict[str, Answers], grating: Grating) -> None:
+def test_every_route_meets_the_closed_form(found: dict[str, Answers], grating: KnownGrating) -> None:
     """Sums to rounding where the samples' own closed form is known, all routes to 1e-4 of the mirror."""
     each = found[grating.name]
     np.testing.assert_allclose(each.direct, each.samples, atol=1e-12)
@@ -35,8 +35,8 @@ def test_every_route_meets_the_closed_form(found: dict[str, Answers], grating: G
     assert each.profile.max() > 0.3
 
 
-def test_places_are_directions_of_orders() -> None:
-    """Light and view of every place are unit vectors: |(u, v)| and |w| leave room for two of them."""
+def test_orders_have_directions() -> None:
+    """Light and view of every order are unit vectors: |(u, v)| and |w| leave room for two of them."""
     rho2 = np.sum(AT.uvw[:, :2] ** 2, axis=1)
     assert np.all(rho2 + AT.uvw[:, 2] ** 2 <= 4.0)
     np.testing.assert_allclose(
@@ -64,12 +64,13 @@ def test_the_samples_needed_are_the_fewest() -> None:
         assert order_efficiencies.sampling_error(grating, samples - 2, AT) > order_efficiencies.TOLERANCE
 
 
-def test_a_wrong_profile_is_told(found: dict[str, Answers]) -> None:
-    """Orders in the wrong place fail the checks of their routes, and of no other."""
-    blaze = found[known_gratings()[2].name]
-    mirrored = replace(blaze, direct=blaze.direct[::-1], reference=blaze.reference[::-1])
-    held = [check.holds for check in order_efficiencies._checks("blaze", mirrored)]
-    assert held == [False, False, False, True, True]
+def test_a_wrong_profile_fails(found: dict[str, Answers]) -> None:
+    """Orders in the wrong direction fail the checks of their algorithms, and of no other."""
+    blaze = known_gratings()[2]
+    right = found[blaze.name]
+    mirrored = replace(right, direct=right.direct[::-1], reference=right.reference[::-1])
+    missed = {check.id for check in order_efficiencies.checks_of(blaze, mirrored) if check.verdict == "misses"}
+    assert missed == {"blaze.direct", "blaze.reference", "blaze.reference.profile"}
 
 
 @pytest.mark.slow
@@ -78,8 +79,8 @@ def test_the_page_holds() -> None:
     config = Config.model_validate(
         {"name": "blazed", "surface": {"recipe": recipe}, "coherence": {"sigma_um": SIGMA}}
     )
-    surface = Surface(config, recipes.make(config.surface.recipe), scan=False)
-    figure = order_efficiencies.make(Bench(surface, surface, surface, quick=True), silent)
-    assert [check.what for check in figure.checks if not check.holds] == []
-    assert all(picture.png.startswith(b"\x89PNG") for picture in figure.pictures)
-    assert figure.numbers["orders"] > 50
+    surface = BenchSurface(config, recipes.make(config.surface.recipe), scan=False)
+    page = order_efficiencies.make(Bench(surface, surface, surface, quick=True), silent)
+    assert [check.id for check in page.checks if check.verdict != "holds"] == []
+    assert all(picture.png.startswith(b"\x89PNG") for picture in page.pictures)
+    assert len(order_efficiencies.propagating(np.array([400.0, 560.0, 720.0])).order) > 50

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, xyz_direct
-from pipeline.evaluation.figures.laser_screen import LIGHT, Screen, bands_of, experiment
+from pipeline.evaluation.figures.laser_screen import LIGHT, Screen, experiment, screen_bands
 from pipeline.optics import geometry
 from pipeline.optics.csv_columns import shipped
 from pipeline.optics.light import illuminant_at, trapezoid
@@ -105,15 +105,15 @@ def test_the_laser_is_dark_below_its_onset_and_rises_above() -> None:
     assert trapezoid(experiment(config()).light, 1.0).weights[:, 1].sum() == pytest.approx(1.0)
 
 
-def test_bands_are_what_rises_again_outwards() -> None:
+def test_bands_rise_again_outwards() -> None:
     axis = np.linspace(-100.0, 100.0, 101)
     falling = np.exp(-np.abs(axis) / 20.0)
-    flat = bands_of(np.tile(falling[:, None], (1, 101)), axis)
+    flat = screen_bands(np.tile(falling[:, None], (1, 101)), axis)
     assert (flat.contrast, flat.share) == (0.0, 0.0)
-    # a band of three times the light where it stands, on one side
+    # a band of three times the light at its place, on one side
     banded = falling.copy()
     banded[np.argmin(np.abs(axis - 40.0))] *= 3.0
-    found = bands_of(np.tile(banded[:, None], (1, 101)), axis)
+    found = screen_bands(np.tile(banded[:, None], (1, 101)), axis)
     before = np.exp(-38.0 / 20.0)
     band = 3.0 * np.exp(-40.0 / 20.0)
     assert found.contrast == pytest.approx(band / before - 1.0)
@@ -126,4 +126,4 @@ def test_the_spot_and_its_vertical_band_are_no_horizontal_band() -> None:
     axis = np.linspace(-100.0, 100.0, 101)
     image = np.tile(np.exp(-np.abs(axis) / 20.0)[:, None], (1, 101))
     image[:, np.abs(axis) < 12.0] += 5.0 * np.cos(axis / 5.0)[:, None] ** 2
-    assert bands_of(image, axis).contrast == 0.0
+    assert screen_bands(image, axis).contrast == 0.0

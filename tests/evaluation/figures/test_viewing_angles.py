@@ -1,5 +1,7 @@
 """Peaks of the first order, the lines behind them, and the periods of table 1."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,8 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.figures import peaks, viewing_angles
-from pipeline.evaluation.figures.figure import Bench, Surface
-from pipeline.evaluation.figures.first_order import ROWS, THETA_I, Row, cut_of
+from pipeline.evaluation.figures.first_order import ROWS, THETA_I, ByPosition, Cut, FirstOrder, Periods, Row, cut_of
+from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.figures.peaks import Plane, band_of, phase_rate
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
@@ -27,7 +29,7 @@ FROM_MINUS_X = Plane(THETA_I, np.pi)
 
 @pytest.fixture(scope="module")
 def blazed() -> HeightField:
-    """25 samples a period: nothing folds back beside the first order."""
+    """25 samples a period: nothing folds back next to the first order."""
     return recipes.make(Blazed(kind="blazed", size_um=(65.0, 65.0), pitch_um=(0.1, 1.0)))
 
 
@@ -93,7 +95,7 @@ def test_two_periods_across_each_other_are_two_lines() -> None:
     x = np.arange(600) * 0.1
     heights = sum(0.02 * np.cos(2 * np.pi * x / period) for period in periods)
     field = HeightField(np.broadcast_to(heights, (60, 600)).copy(), (size / 600, 1.0))
-    row = Row("two", "xenopeltis", "x", (0.42, 0.75), ((600.0, 0.0), (535.7, 0.0)))
+    row = Row("two", "two", "xenopeltis", "x", (0.42, 0.75), ((600.0, 0.0), (535.7, 0.0)))
     power = Reference(field, SIGMA_UM, 380.0).power
     cut = cut_of(power, Plane(THETA_I, 0.0), row, band_of(row.search_um, SIGMA_UM), LAMBDA_NM)
     means = [line.mean for _, line in cut.lines]
@@ -102,19 +104,19 @@ def test_two_periods_across_each_other_are_two_lines() -> None:
     assert all(min(abs(nm - 600.0), abs(nm - 535.71)) < 1.0 for nm in cut.brightest.nm)
 
 
-def test_the_walk_is_the_sum_over_samples_with_the_window_elsewhere() -> None:
+def test_moving_the_window_is_the_sum_over_samples_with_the_window_elsewhere() -> None:
     field = HeightField(np.random.default_rng(2).uniform(-0.1, 0.1, (40, 48)), (0.1, 0.12))
     sigma, nm, f = 0.8, 550.0, np.array([0.5, 0.9, 1.4])
     plane = Plane(THETA_I, 0.0)
     s = phase_rate(plane, 0.9, nm)
-    walked = peaks.walk(field, sigma, s, f, 4)
+    moved = peaks.by_position(field, sigma, s, f, 4)
     w = s * 1e-3 * nm / (2.0 * np.pi)
     for row, column in ((2, 2), (0, 0), (3, 1)):
         rolled = np.roll(field.heights_um, (20 - 10 * row, 24 - 12 * column), axis=(0, 1))
         for side, sign in enumerate((-1.0, 1.0)):
             uvw = np.stack([sign * f * 1e-3 * nm, np.zeros(3), np.full(3, w)], axis=-1)
             direct = power_direct(HeightField(rolled, field.pitch_um), sigma, uvw, nm)
-            np.testing.assert_allclose(walked[row, column, side], direct, rtol=1e-9)
+            np.testing.assert_allclose(moved[row, column, side], direct, rtol=1e-9)
 
 
 def test_frequencies_of_a_plane_are_those_of_its_directions() -> None:
@@ -140,7 +142,7 @@ def test_the_published_bias_of_the_blazed_grating_is_the_reflectances_slope() ->
 
 
 @pytest.mark.slow
-def test_the_page_says_all_of_it() -> None:
+def test_the_page_is_whole() -> None:
     small = {"size_um": 25.0, "pitch_um": 0.1}
     bench = Bench(
         blazed=_surface("blazed", {"kind": "blazed", **small}),
@@ -148,25 +150,44 @@ def test_the_page_says_all_of_it() -> None:
         xenopeltis=_surface("rows", {"kind": "xenopeltis", **small}),
         quick=True,
     )
-    figure = viewing_angles.make(bench, silent)
-    assert [check.holds for check in figure.checks] == [True, True, True, None, None, None]
-    assert len(figure.pictures) == 5
-    assert all(picture.png.startswith(b"\x89PNG") for picture in figure.pictures)
-    assert all(len(row) == len(table.columns) for table in figure.tables for row in table.rows)
-    elaphe = figure.numbers["rows"]["Elaphe"]
+    page = viewing_angles.make(bench, silent)
+    assert {check.id: check.verdict for check in page.checks} == {
+        **dict.fromkeys(("blazed.line", "blazed.extrapolated", "blazed.peak"), "holds"),
+        **dict.fromkeys(("elaphe.line1", "along.line1", "across.line1", "across.line2"), "reported"),
+    }
+    assert len(page.pictures) == 5
+    assert all(picture.png.startswith(b"\x89PNG") for picture in page.pictures)
+    assert all(len(row) == len(table.columns) for table in page.tables for row in table.rows)
+    elaphe = next(row for row in page.document()["tables"]["methods"] if row.pop("surface") == "Elaphe")
+    assert set(elaphe) == {"exact", "FLSS", "NMM", "PQ"}
     # the recipe's firm period, by every method
-    for name, found in {"exact": elaphe["brightest"], **elaphe["methods"]}.items():
-        assert found["mean_nm"] == pytest.approx(1144.0, abs=12.0), name
+    for name, (mean, _variance) in elaphe.items():
+        assert mean == pytest.approx(1144.0, abs=12.0), name
+
+
+def test_of_a_scan_the_page_reports_which_windows_show_the_published_period() -> None:
+    """The share of windows with a shorter period; of a recipe there is no such statement."""
+    row = ROWS[1]
+    periods = np.full((4, 4, 2), 1100.0)
+    periods[0] = 1200.0
+    lines = ((Periods(np.array([1144.0])), Periods(np.array([1144.1]))),)
+    cut = Cut(Plane(THETA_I, 0.0), np.ones((1, 3)), lines[0][0], lines)
+    for scan, ids in ((True, ["elaphe.line1", "elaphe.windows1"]), (False, ["elaphe.line1"])):
+        surface = replace(_surface("skin", {"kind": "elaphe", "size_um": 10.0, "pitch_um": 0.1}), scan=scan)
+        found = FirstOrder(row, surface, cut, cut)
+        checks = list(viewing_angles.snake_checks([found], [ByPosition(row, periods, np.array([1100.0, 1200.0]))]))
+        assert [check.id for check in checks] == ids
+        assert checks[-1].value == pytest.approx(75.0 if scan else 1144.1)
 
 
 def _config(name: str, recipe: dict[str, object]) -> Config:
     return Config(name=name, surface=SurfaceSource.model_validate({"recipe": recipe}))
 
 
-def _surface(name: str, recipe: dict[str, object]) -> Surface:
+def _surface(name: str, recipe: dict[str, object]) -> BenchSurface:
     config = _config(name, recipe)
     assert config.surface.recipe is not None
-    return Surface(config, recipes.make(config.surface.recipe), scan=False)
+    return BenchSurface(config, recipes.make(config.surface.recipe), scan=False)
 
 
 def test_a_sinusoid_seen_from_either_side_has_one_period() -> None:

@@ -1,4 +1,4 @@
-"""PQ: the transform of a finite crystal of patches, its orders, and its fringes beside FLSS."""
+"""PQ: the transform of a finite crystal of patches, its orders, and its fringes against FLSS."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_it_is_the_sum_over_all_samples_of_the_patches(patches: tuple[int, int])
     """|mean exp(i k w h) exp(2 pi i f.x)| over n x m copies laid side by side: no series, no DFT, no window.
 
     A sinc cut after 400 coefficients leaves 1 / 400 pi of amplitude. The samples' number is odd, so that no
-    coefficient of the DFT stands for two frequencies.
+    coefficient of the DFT represents two frequencies.
     """
     rng = np.random.default_rng(4)
     field = HeightField(rng.uniform(-0.04, 0.04, (45, 51)), (0.11, 0.13))
@@ -64,7 +64,7 @@ def test_orders_stand_where_the_grating_equation_says(theta_deg: float) -> None:
     power = method.power(uvw, NM)[:, 0]
     peaks = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] > power[2:]) & (power[1:-1] > 0.01)) + 1
     orders = uvw[peaks, 0] * 2.6 / 0.55
-    # side lobes of the box stand at one and a half coefficients, a twentieth of an order, and 0.05 of its height
+    # side lobes of the box lie at one and a half coefficients, a twentieth of an order, and 0.05 of its height
     main = [peak for peak in peaks if power[peak] > 0.2 * power[np.abs(sine - sine[peak]) < 0.03].max()]
     found = uvw[main, 0] * 2.6 / 0.55
     np.testing.assert_allclose(found, np.round(found), atol=0.01)
@@ -104,7 +104,7 @@ def test_fringes_are_coloured(elaphe: HeightField) -> None:
 
 
 def test_elaphe_looks_different(elaphe: HeightField) -> None:
-    """More than what a viewer tells apart at once, at an exposure that makes the two equally bright."""
+    """More than a just noticeable difference, at an exposure that makes the two equally bright."""
     sine = np.linspace(-0.9, 0.9, 41)
     x, y = (axis.ravel() for axis in np.meshgrid(sine, sine))
     inside = np.hypot(x, y) < 0.95
@@ -116,7 +116,7 @@ def test_elaphe_looks_different(elaphe: HeightField) -> None:
 
 
 def test_as_many_patches_as_coherent_light_spans() -> None:
-    """ceil(4 sigma / X), at least two: a blaze of one period stands 26 times in 65 um."""
+    """ceil(4 sigma / X), at least two: a blaze of one period fits 26 times into 65 um."""
     single = config({"kind": "blazed", "period_um": 2.5, "size_um": 2.5, "pitch_um": 0.05}, sigma=16.25)
     field = made(single)
     u = np.linspace(0.0, 0.5, 97)
