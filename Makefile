@@ -75,11 +75,11 @@ has-config:
 # the measured scans, where they lie next to the checkout; otherwise bench and validation use synthetic surfaces
 SCANS := $(if $(wildcard ../shared/data/snakes),tests/scans/elaphe_scan.toml tests/scans/xenopeltis_scan.toml configs/blazed.toml)
 bench: setup
-	$(BAKE) bench $(SCANS) --out $(OUT)/bench
+	$(BAKE) bench speed $(SCANS) --out $(OUT)/speed
 
 VALIDATED := $(if $(wildcard ../shared/data/snakes),--elaphe tests/scans/elaphe_scan.toml --xenopeltis tests/scans/xenopeltis_scan.toml)
 validation: setup
-	$(BAKE) validate --bench $(VALIDATED) --out $(OUT)
+	$(BAKE) bench figures $(VALIDATED) --out $(OUT)/figures
 
 lint: $(VENV)/ready
 	$(VENV)/bin/ruff check .

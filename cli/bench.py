@@ -1,215 +1,185 @@
-"""`bench`: run time against error of every way to the same pictures."""
+"""`bench`: run time against error, numerical stability, and the literature's figures."""
 
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from cli import console, sources
 
-# what comes with the tool, where no config is named: each recipe with its defaults
-_BUILT_IN = ("elaphe", "xenopeltis", "blazed")
+if TYPE_CHECKING:
+    from pipeline.evaluation.check import Check
+    from pipeline.evaluation.figures.bench import FigureResults
+    from pipeline.evaluation.speed.bench import SpeedResults
+    from pipeline.evaluation.speed.suite import Point, SurfaceSpeed
+    from pipeline.evaluation.stability.bench import StabilityResults
+
+    Results = SpeedResults | StabilityResults | FigureResults
+
 _PROCESS = "from cli.main import process; process()"
-_WHOLE_RUNS = 6
 
 
-@click.command("bench")
+def _out_option(default: str, files: str) -> Callable[..., Any]:
+    path = click.Path(path_type=Path, file_okay=False)
+    return click.option("--out", type=path, default=Path(default), show_default=True, help=f"Folder for {files}.")
+
+
+@click.group("bench")
+def bench_command() -> None:
+    """Measure the tool: its speed, its numerical stability, and its figures beside the literature's."""
+
+
+@bench_command.command("speed")
 @click.argument("config_paths", metavar="[CONFIG]...", type=click.Path(path_type=Path), nargs=-1)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("out/bench"),
-    show_default=True,
-    help="Folder for bench.json, bench.csv and bench.png.",
-)
+@_out_option("out/speed", "speed.json, speed.csv and speed.png")
 @click.option("--quick", is_flag=True, help="Smaller maps and samples; no processes, no 4096 x 4096 scan.")
 @console.store_option
 @console.json_option
-def bench_command(
+def speed_command(
     config_paths: tuple[Path, ...], out: Path, quick: bool, store_root: Path | None, as_json: bool
 ) -> None:
     """Time CONFIGs' surfaces here, error against seconds and bytes.
 
     The paper's tables over their parameters, the polar table over its own, the same polar table by FINUFFT and both
     in plain numpy, each with its mean CIELAB error at 7500 RU; the stages' shares of the device's peak and
-    bandwidth, which are measured in the same run; the stack's transforms by the kernel, pyFFTW and scipy; what each
-    constant of the kernels buys; and what compiling costs. Without CONFIGs: three synthetic surfaces.
+    bandwidth, which are measured in the same run; the stack's transforms by the kernel, pyFFTW and scipy; the gain
+    of each constant of the kernels; and the cost of compiling. Without CONFIGs: three synthetic surfaces.
     """
-    from pipeline.evaluation.speed import criteria, files, machine
-    from pipeline.evaluation.stability import judging, sweep
-    from pipeline.store.store import writing
-
-    store = console.open_store(store_root)
-    with _paths(config_paths) as paths:
-        configs = [sources.load(path) for path in paths]
-        # better told now than after minutes of work
-        with writing(out):
-            out.mkdir(parents=True, exist_ok=True)
-        console.note("device:")
-        measured = machine.measure()
-        found = []
-        for config, path in zip(configs, paths, strict=True):
-            console.note(f"{config.name}:")
-            found.append(_surface(config, path, store, quick))
-            measured = machine.best(measured, machine.measure())
-        constants = [] if quick else _constants(configs[0], store)
-    judged = [c for bench, whole_run_s in found for c in criteria.of_surface(bench, measured, whole_run_s)]
-    judged += [*criteria.of_series(judging.criterion(judging.sweep(sweep.tall()))), _large_scan(quick)]
-    judged += criteria.of_compiling(None if quick else _compiling())
-    results = files.Results(measured, [bench for bench, _ in found], constants, judged)
-    written = _write(results, out)
-    if as_json:
-        console.print_json({**files.document(results), "files": [str(path) for path in written]})
-        return
-    _tell(results)
-    for path in written:
-        click.echo(str(path))
-
-
-@contextmanager
-def _paths(given: tuple[Path, ...]) -> Iterator[tuple[Path, ...]]:
-    """The configs given, or the built-in ones for as long as they are needed."""
-    if given:
-        yield given
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        paths = tuple(Path(folder) / f"{name}.toml" for name in _BUILT_IN)
-        for name, path in zip(_BUILT_IN, paths, strict=True):
-            path.write_text(f'name = "{name}"\n[surface]\nrecipe = {{ kind = "{name}" }}\n', encoding="utf-8")
-        yield paths
-
-
-def _surface(config: Any, path: Path, store: Any, quick: bool) -> tuple[Any, float | None]:
-    """One surface's measurements, and the seconds of a whole run."""
-    from pipeline.evaluation.speed import suite
-
-    with console.showing_progress() as progress:
-        field = _field(config, store, progress)
-        effort = suite.QUICK if quick else suite.FULL
-        found = suite.run(config, field, effort, progress)
-        return found, None if quick else _whole_run(path, progress)
-
-
-def _field(config: Any, store: Any, progress: Any) -> Any:
-    """The height field of a config."""
-    from pipeline.stages import run, surface
-
-    artifacts = run.execute(config, run.plan(config, store, "surface"), store, progress)
-    return surface.load(store.open("surface", artifacts["surface"].key))
-
-
-def _constants(config: Any, store: Any) -> Any:
-    """What each constant of the kernels buys on a surface."""
-    from pipeline.evaluation.speed import constants, setting
-    from pipeline.evaluation.speed.suite import FULL, MAIN
-
-    console.note("constants of the kernels:")
-    with console.showing_progress() as progress:
-        of = setting.make(_field(config, store, progress), config, MAIN)
-        return constants.measure(of, FULL.bakes, progress)
-
-
-def _compiling() -> Any:
-    """What a new machine waits for; None where a run failed."""
-    from pipeline.evaluation.speed import compiling
-    from pipeline.evaluation.speed.processes import RunFailedError
-
-    console.note("a new machine:")
-    try:
-        with console.showing_progress() as progress:
-            return compiling.measure(_command_line(), progress)
-    except RunFailedError as error:
-        console.warn(f"a run on a new kernel cache failed: {error}")
-        return None
-
-
-def _command_line() -> Any:
+    from pipeline.evaluation.speed import bench
     from pipeline.evaluation.speed.processes import CommandLine
-
-    return CommandLine((sys.executable, "-c", _PROCESS))
-
-
-def _whole_run(path: Path, progress: Any) -> float | None:
-    """Seconds of a fresh `run --until table` with an empty store and warm kernels; None where it fails.
-
-    The first fills the kernel cache; the fastest of the others counts.
-    """
-    from pipeline.evaluation.speed.processes import RunFailedError
-
-    seconds: list[float] = []
-    try:
-        for i in range(_WHOLE_RUNS):
-            seconds.append(_command_line().run(path, until="table").seconds)
-            progress("whole runs", (i + 1) / _WHOLE_RUNS)
-    except RunFailedError as error:
-        console.warn(f"{path}: run --until table failed: {error}")
-        return None
-    return min(seconds[1:])
-
-
-def _large_scan(quick: bool) -> Any:
-    from pipeline.evaluation.speed import criteria, memory
-    from pipeline.evaluation.speed.suite import MAIN
-
-    if quick:
-        return criteria.of_large_scan(None)
-    console.note(f"{memory.LARGE_SIDE} x {memory.LARGE_SIDE} samples, 64 terms:")
-    return criteria.of_large_scan(memory.peak_bytes(*memory.large_scan(), MAIN))
-
-
-def _write(results: Any, out: Path) -> list[Path]:
-    """bench.json, bench.csv and bench.png in `out`, each taking its place whole."""
-    from pipeline.evaluation.plots import bench_plots
-    from pipeline.evaluation.speed import files, truth
     from pipeline.store import scratch
-    from pipeline.store.store import writing
 
-    contents = {
-        "bench.json": files.json_text(results).encode(),
-        "bench.csv": files.csv_text(results).encode(),
-        "bench.png": bench_plots.error_against_cost(results.surfaces, truth.EXPOSURE_RU),
-    }
-    with writing(out), scratch.replacing(out) as beside:
-        for name, content in contents.items():
-            (beside / name).write_bytes(content)
-    return [out / name for name in contents]
+    scratch.require_folder(out)
+    command_line = CommandLine((sys.executable, "-c", _PROCESS))
+    with nullcontext(config_paths) if config_paths else bench.built_in() as paths:
+        configs = [(sources.load(path), path) for path in paths]
+        with console.showing_progress() as progress:
+            store = console.open_store(store_root)
+            found = bench.run(configs, quick, store, command_line, progress, console.note)
+    if written := _write(found, out, as_json):
+        _print_speed(found)
+        click.echo("\n".join(written))
 
 
-def _tell(results: Any) -> None:
+@bench_command.command("stability")
+@click.option("--quick", is_flag=True, help="A part of the sweep that takes seconds.")
+@_out_option("out/stability", "stability.json, stability.csv and stability.png")
+@console.json_option
+def stability_command(quick: bool, out: Path, as_json: bool) -> None:
+    """Compare every algorithm with plain sums over samples, from 1 nm to 10 um of height.
+
+    Surfaces, pitches, sizes, windows and directions at their extremes, in float32 and float64, Taylor and Chebyshev.
+    Each test case meets the tolerance of its algorithm or is refused with a reason. Exit code 4 where one does
+    neither.
+    """
+    from pipeline.errors import AccuracyError
+    from pipeline.evaluation.stability import bench
+    from pipeline.store import scratch
+
+    scratch.require_folder(out)
+    with console.showing_progress() as progress:
+        found = bench.run(quick, progress)
+    if written := _write(found, out, as_json):
+        _print_stability(found)
+        click.echo("\n".join(written))
+    if found.faults:
+        raise AccuracyError("\n".join(found.faults))
+
+
+@bench_command.command("figures")
+@click.option("--elaphe", type=click.Path(path_type=Path), help="A config to replace Elaphe [default: synthetic].")
+@click.option(
+    "--xenopeltis", type=click.Path(path_type=Path), help="A config to replace Xenopeltis [default: synthetic]."
+)
+@click.option("--quick", is_flag=True, help="Smaller maps, fewer points.")
+@_out_option("out/figures", "index.html, a page for each figure, and figures.json")
+@console.store_option
+@console.json_option
+def figures_command(
+    elaphe: Path | None, xenopeltis: Path | None, quick: bool, out: Path, store_root: Path | None, as_json: bool
+) -> None:
+    """Make a page for each figure and table of the literature.
+
+    Every method of the literature side by side, with what was expected, what was measured and the verdict. It needs
+    no file: snakes are synthetic where no config of a scan is given.
+    """
+    from pipeline.evaluation.figures import bench
+    from pipeline.store import scratch
+
+    scratch.require_folder(out)
+    given = {"elaphe": elaphe, "xenopeltis": xenopeltis}
+    configs = {role: (sources.load(path), str(path)) for role, path in given.items() if path}
+    with console.showing_progress() as progress:
+        found = bench.run(configs, quick, console.open_store(store_root), progress, console.note)
+    if _write(found, out, as_json):
+        _print_figures(found)
+        click.echo(str(out / "index.html"))
+
+
+def _write(found: "Results", out: Path, as_json: bool) -> list[str]:
+    """Write the results; print them as JSON, or return the files' names so that text can be printed."""
+    from pipeline.evaluation import results
+
+    written = [str(path) for path in results.write(out, found.files())]
+    if as_json:
+        console.print_json({**found.document(), "files": written})
+        return []
+    return written
+
+
+def _print_rows(rows: Iterable[Any], columns: dict[str, Callable[[Any], str]]) -> None:
+    """Print a table; columns: text of a row's cell by the column's name."""
+    console.print_table(list(columns), [[text(row) for text in columns.values()] for row in rows])
+
+
+def _print_checks(checks: "Sequence[Check]") -> None:
+    _print_rows(
+        checks,
+        {
+            "check": lambda check: check.id,
+            "measured": lambda check: check.measured or "-",
+            "expected": lambda check: check.expected or "-",
+            "verdict": lambda check: check.verdict,
+            "of": lambda check: f"{check.what}: {check.remark}" if check.remark else check.what,
+        },
+    )
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.1f} ms"
+
+
+def _print_speed(found: "SpeedResults") -> None:
     """The device, every table, the stages' shares, and the criteria."""
-    machine = results.machine
+    machine = found.machine
     click.echo(
         f"{machine.device}, {machine.compute_units} compute units: {machine.single_flops / 1e9:.0f} GFLOP/s single, "
         f"{machine.double_flops / 1e9:.0f} double, {machine.bandwidth / 1e9:.1f} GB/s, measured in this run"
     )
-    for surface in results.surfaces:
-        _tell_surface(surface, machine)
-    if results.constants:
+    for surface in found.surfaces:
+        _print_surface(surface, found)
+    if found.constants:
         click.echo("")
-        console.print_table(
-            ["kernels' constant", "value", "time", "instead", "time", "buys"],
-            [_constant_row(constant) for constant in results.constants],
+        _print_rows(
+            found.constants,
+            {
+                "kernels' constant": lambda constant: constant.name,
+                "value": lambda constant: str(constant.value),
+                "time": lambda constant: _ms(constant.seconds),
+                "other": lambda constant: str(constant.other_value),
+                "time ": lambda constant: _ms(constant.other_s),
+                "gain": lambda constant: f"{100.0 * (1.0 - constant.seconds / constant.other_s):.0f} %",
+            },
         )
     click.echo("\nCriteria")
-    console.print_table(
-        ["surface", "no.", "what", "measured", "asked", "verdict", ""],
-        [[c.surface, c.number, c.what, _measured(c), _asked(c), c.verdict, c.remark] for c in results.criteria],
-    )
+    _print_checks(found.checks)
 
 
-def _measured(criterion: Any) -> str:
-    return "-" if criterion.measured is None else f"{criterion.measured:.3g} {criterion.unit}"
-
-
-def _asked(criterion: Any) -> str:
-    return "-" if criterion.limit is None else f"{criterion.sense} {criterion.limit:.3g} {criterion.unit}"
-
-
-def _tell_surface(surface: Any, machine: Any) -> None:
+def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:
     from pipeline.evaluation.speed.machine import share
 
     ny, nx = surface.samples
@@ -217,79 +187,89 @@ def _tell_surface(surface: Any, machine: Any) -> None:
         f"\n{surface.name}: {nx} x {ny} samples, sigma {surface.sigma_um:g} um, {surface.terms} terms; "
         f"errors over a map of {surface.map_size} x {surface.map_size}"
     )
-    console.print_table(
-        ["table", "grid", "time", "bytes", "mean dE", "99th %", "max"], [_point_row(p) for p in surface.points]
+    _print_rows(
+        surface.points,
+        {
+            "table": lambda point: point.method,
+            "grid": _grid,
+            "time": lambda point: f"{point.seconds:.3g} s" + (" (scaled)" if point.scaled else ""),
+            "bytes": lambda point: f"{point.bytes / 1e6:.1f} MB",
+            "mean dE": lambda point: f"{point.error.mean:.3g}",
+            "99th %": lambda point: f"{point.error.percentile_99:.3g}",
+            "max": lambda point: f"{point.error.maximum:.3g}",
+        },
     )
     click.echo("")
-    console.print_table(
-        ["stage", "time", "of FMA peak", "of bandwidth", "bound by"],
-        [
-            [
-                reached.stage,
-                f"{1e3 * reached.seconds:.1f} ms",
-                f"{100 * reached.peak_share:.1f} % ({reached.precision})",
-                f"{100 * reached.bandwidth_share:.1f} %",
-                reached.bound,
-            ]
-            for reached in (share(timed, machine) for timed in surface.timed)
-        ],
+    _print_rows(
+        [share(timed, found.machine) for timed in surface.timed],
+        {
+            "stage": lambda reached: reached.stage,
+            "time": lambda reached: _ms(reached.seconds),
+            "of FMA peak": lambda reached: f"{100 * reached.peak_share:.1f} % ({reached.precision})",
+            "of bandwidth": lambda reached: f"{100 * reached.bandwidth_share:.1f} %",
+            "bound by": lambda reached: reached.bound,
+        },
     )
     click.echo("")
-    console.print_table(
-        ["the stack's transforms", "kernel", "pyFFTW", "", "differs", "scipy", "", "differs"],
-        [_transforms_row(of) for of in surface.transforms],
+    # the ratio to the kernel's time, and the largest difference from the kernel's coefficients
+    _print_rows(
+        surface.transforms,
+        {
+            "the stack's transforms": lambda of: f"{of.terms} terms, {of.precision}",
+            "kernel": lambda of: f"{1e3 * of.kernel_s:.0f} ms",
+            "pyFFTW": lambda of: f"{1e3 * of.fftw_s:.0f} ms, {of.fftw_s / of.kernel_s:.1f} x",
+            "differs": lambda of: f"{of.fftw_difference:.0e}",
+            "scipy": lambda of: f"{1e3 * of.scipy_s:.0f} ms, {of.scipy_s / of.kernel_s:.1f} x",
+            "differs ": lambda of: f"{of.scipy_difference:.0e}",
+        },
     )
-    for text in _remarks(surface):
-        click.echo(text)
-
-
-def _transforms_row(of: Any) -> list[str]:
-    """Each route's time, its ratio to the kernel's, and its largest difference from the kernel's coefficients."""
-    row = [f"{of.terms} terms, {of.precision}", f"{1e3 * of.kernel_s:.0f} ms"]
-    for seconds, difference in ((of.fftw_s, of.fftw_difference), (of.scipy_s, of.scipy_difference)):
-        row += [f"{1e3 * seconds:.0f} ms", f"{seconds / of.kernel_s:.1f} x", f"{difference:.0e}"]
-    return row
-
-
-def _constant_row(constant: Any) -> list[str]:
-    """A constant's kernels with its value and with another, and the share of their time that it saves."""
-    here, other = constant.seconds, constant.other_s
-    return [
-        constant.name,
-        f"{constant.value}",
-        f"{1e3 * here:.1f} ms",
-        f"{constant.other_value}",
-        f"{1e3 * other:.1f} ms",
-        f"{100.0 * (1.0 - here / other):.0f} %",
-    ]
-
-
-def _point_row(point: Any) -> list[str]:
-    settings = point.settings
-    if "rings" in settings:
-        grid = f"{settings['rings']} x {settings['azimuths']}"
-    else:
-        grid = f"{settings['resolution']:.0f}^2, {settings['step_nm']:g} nm"
-    if "textures" in settings:
-        grid += f", {settings['textures']} textures"
-    seconds = f"{point.seconds:.3g} s" + (" (scaled)" if point.scaled else "")
-    error = point.error
-    numbers = (f"{value:.3g}" for value in (error.mean, error.percentile_99, error.maximum))
-    return [point.method, grid, seconds, f"{point.bytes / 1e6:.1f} MB", *numbers]
-
-
-def _remarks(surface: Any) -> list[str]:
-    """How the ways to the same numbers agree, and what was left out."""
-    lines = []
     for name, agreement in (("FINUFFT", surface.agreement.nufft), ("plain numpy", surface.agreement.numpy)):
         if agreement is not None:
-            lines.append(
+            click.echo(
                 f"{name} and the kernels, on the polar table's samples: median difference {agreement.median:.1e}, "
                 f"99th percentile {agreement.percentile_99:.1e}"
             )
     if surface.nufft_upsampling is not None:
-        lines.append(
-            f"FINUFFT: type 2 on the low-passed patch under the window, 1e-5, single, upsampling "
+        click.echo(
+            "FINUFFT: type 2 on the low-passed patch under the window, 1e-5, single, upsampling "
             f"{surface.nufft_upsampling:g}; FFTs count once, the rest is scaled by points"
         )
-    return [*lines, *(f"note: {text}" for text in surface.notes)]
+    for text in surface.notes:
+        click.echo(f"note: {text}")
+
+
+def _grid(point: "Point") -> str:
+    settings = point.settings
+    if "rings" not in settings:
+        return f"{settings['resolution']:.0f}^2, {settings['step_nm']:g} nm"
+    textures = f", {settings['textures']} textures" if "textures" in settings else ""
+    return f"{settings['rings']} x {settings['azimuths']}{textures}"
+
+
+def _print_stability(found: "StabilityResults") -> None:
+    """A row for each family of cases, and the criterion."""
+    rows = []
+    for family in dict.fromkeys(outcome.case.family for outcome in found.outcomes):
+        here = [outcome for outcome in found.outcomes if outcome.case.family == family]
+        counts = Counter(outcome.verdict for outcome in here)
+        shares = [o.check.value / o.tolerance for o in here if o.verdict != "refused" and o.check.value is not None]
+        worst = f"{100.0 * max(shares):.2g} %" if shares else ""
+        rows.append([family, *(str(counts[verdict]) for verdict in ("holds", "refused", "misses")), worst])
+    console.print_table(["family", "holds", "refused", "misses", "worst error, of its tolerance"], rows)
+    for check in found.checks:
+        click.echo(f"{check.what}: {check.measured}, expected {check.expected}: {check.verdict}")
+    click.echo("(worst error of |P|^2 over the larger of it and a thousandth of its mean)")
+
+
+def _print_figures(found: "FigureResults") -> None:
+    """A row for each page, then every statement that does not hold."""
+    rows = []
+    for each in found.made:
+        counts = Counter(check.verdict for check in each.page.checks)
+        verdicts = [str(counts[verdict]) for verdict in ("holds", "misses", "reported")]
+        rows.append([each.page.name, *verdicts, f"{each.seconds:.0f} s"])
+    console.print_table(["page", "holds", "misses", "reported", "time"], rows)
+    for each in found.made:
+        for check in each.page.checks:
+            if check.verdict == "misses":
+                click.echo(f"{each.page.name}: {check.what}: expected {check.expected}, measured {check.measured}")

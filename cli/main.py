@@ -19,7 +19,6 @@ _COMMANDS = {
     "publish": "cli.publish",
     "verify": "cli.publish",
     "bench": "cli.bench",
-    "stress": "cli.stress",
     "store": "cli.store",
     "doctor": "cli.doctor",
 }

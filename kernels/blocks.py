@@ -2,7 +2,7 @@
 
 Kernels work on vectors of 64 bytes, which take one of 32 registers with AVX-512 and two of 16 with AVX2. Blocks that
 fit the smaller set are as fast with the larger one, to the noise of the measurement, and compile a tenth faster: one
-set serves both. `diffract-bake bench` times every constant beside another value.
+set serves both. `diffract-bake bench speed` times every constant beside another value.
 """
 
 from collections.abc import Iterator

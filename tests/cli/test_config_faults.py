@@ -44,10 +44,10 @@ def untouched(tool: Tool) -> bool:
     return not tool.store.exists() and not tool.out.exists()
 
 
-@pytest.mark.parametrize("command", ["run", "plan", "validate", "publish", "render", "bench"])
+@pytest.mark.parametrize("command", ["run", "plan", "validate", "publish", "render", "bench speed"])
 def test_every_fault_at_once_with_its_key(tool: Tool, command: str) -> None:
     (tool.folder / "faulty.toml").write_text(FAULTY, encoding="utf-8")
-    result = tool(command, "faulty.toml")
+    result = tool(*command.split(), "faulty.toml")
     assert result.code == 2
     assert result.stdout == ""
     assert result.errors == result.stderr.splitlines()

@@ -138,7 +138,7 @@ def test_publish_warns_as_run_does(tool: Tool) -> None:
 
 @pytest.mark.slow
 def test_bench_of_a_grating(copy: Tool) -> None:
-    result = copy("bench", "small.toml", "--quick", "--json")
+    result = copy("bench", "speed", "small.toml", "--quick", "--json")
     assert result.code == 0, result.stderr
     assert result.json["surfaces"][0]["agreement"]["numpy"]["median"] < 1e-3
 

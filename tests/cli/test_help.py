@@ -10,6 +10,7 @@ from cli.main import _COMMANDS
 from tests.cli.tool import Tool, too_wide
 
 COMMANDS = [[name] for name in _COMMANDS] + [["store", name] for name in ("list", "check", "collect")]
+COMMANDS += [["bench", name] for name in ("speed", "stability", "figures")]
 
 
 @pytest.mark.parametrize("command", [[], *COMMANDS], ids=" ".join)
@@ -24,7 +25,7 @@ def test_every_command_has_help(tool: Tool, command: list[str]) -> None:
     assert all(line.split("  ")[-1] for line in options)
 
 
-@pytest.mark.parametrize("command", [c for c in COMMANDS if c != ["store"]], ids=" ".join)
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in (["store"], ["bench"])], ids=" ".join)
 def test_every_command_speaks_json(tool: Tool, command: list[str]) -> None:
     assert "--json" in tool(*command, "--help").stdout
 

@@ -1,4 +1,4 @@
-"""The bench's other ways to the same numbers, its counts of work, and its verdicts."""
+"""Other algorithms for the same numbers, counts of work, and criteria."""
 
 from dataclasses import replace
 from typing import Literal
@@ -9,10 +9,11 @@ import pytest
 from kernels import device
 from pipeline.accuracy.checks import relative_error
 from pipeline.config.models import Config
-from pipeline.evaluation.speed import machine, memory, nufft, plain, polar_bake, setting, transforms, work
-from pipeline.evaluation.speed.criteria import Criterion
+from pipeline.evaluation import plain_numpy
+from pipeline.evaluation.speed import checks, machine, memory, nufft, polar_bake, setting, transforms, work
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
 from pipeline.evaluation.speed.polar_bake import Stages
+from pipeline.evaluation.speed.processes import Compiling
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of
 from pipeline.evaluation.speed.truth import MapTruth
@@ -58,11 +59,11 @@ def test_plain_numpy_gives_the_samples(case: Setting) -> None:
     """One texel after the other, from the same stack: what is left is E's interpolation."""
     built = case.stack()
     samples = case.samples(case.power_spectrum(built))
-    coefficients = plain.complex_coefficients(built)
+    coefficients = plain_numpy.complex_coefficients(built)
     rho, phi = case.plan.rings.rho(), case.plan.azimuths.angles()
     for ring, azimuth in ((0, 5), (7, 40), (15, 90), (23, 61)):
         uv = rho[ring] * np.array([np.cos(phi[azimuth]), np.sin(phi[azimuth])])
-        found = plain.polar_texel(built, coefficients, case.rule_of_ring(ring), uv, case.series(ring))
+        found = plain_numpy.polar_texel(built, coefficients, case.rule_of_ring(ring), uv, case.series(ring))
         error = relative_error(samples[ring, :, :, azimuth], found, 1e-4 * samples.max())
         assert error.median < 1e-3
         assert error.maximum < 0.05
@@ -205,15 +206,20 @@ def test_memory_is_that_of_a_process_of_its_own() -> None:
 
 
 @pytest.mark.parametrize(
-    ("measured", "sense", "limit", "verdict"),
-    [
-        (0.08, "<=", 0.08, "pass"),
-        (0.081, "<=", 0.08, "MISS"),
-        (50.0, ">=", 50.0, "pass"),
-        (3.0, "<", 3.0, "MISS"),
-        (None, "<", 3.0, "not measured"),
-        (3.0, "<", None, "told"),
-    ],
+    ("peak_bytes", "verdict"), [(None, "not measured"), (3 * 2**30, "misses"), (3 * 2**30 - 1, "holds")]
 )
-def test_verdicts(measured: float | None, sense: str, limit: float | None, verdict: str) -> None:
-    assert Criterion("x", "1", "y", measured, sense, limit, "").verdict == verdict
+def test_a_large_scan_has_a_bound(peak_bytes: int | None, verdict: str) -> None:
+    check = checks.of_large_scan(peak_bytes)
+    assert (check.id, check.verdict) == ("large_scan.speed.memory", verdict)
+
+
+def test_a_new_machine_has_bounds() -> None:
+    found = {check.id: check.verdict for check in checks.of_compiling(Compiling(3.0, 1.01, 20.0, 8.1))}
+    assert found == {
+        "new_machine.speed.first": "holds",
+        "new_machine.speed.next": "misses",
+        "new_machine.speed.first_bake": "holds",
+        "new_machine.speed.second_bake": "misses",
+    }
+    failed = checks.of_compiling(None, "no compiler")
+    assert {(check.verdict, check.remark) for check in failed} == {("not measured", "no compiler")}

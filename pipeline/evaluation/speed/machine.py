@@ -1,4 +1,4 @@
-"""What the device can do at most, measured, and what share of it a stage reaches."""
+"""The limits of the device, measured, and the share of them that a stage reaches."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -19,34 +19,26 @@ class Machine:
     bandwidth: float
 
     def peak(self, precision: Precision) -> float:
+        """Return the FMA peak of a precision, operations a second."""
         return self.single_flops if precision == "single" else self.double_flops
 
 
 def measure() -> Machine:
-    """Peaks and bandwidth of the default device, as they are now."""
+    """Measure peaks and bandwidth of the default device."""
     used = device.default_device()
-    return Machine(
-        used.name,
-        used.compute_units,
-        device.measure_peak("single"),
-        device.measure_peak("double"),
-        device.measure_bandwidth(),
-    )
+    peaks = device.measure_peak("single"), device.measure_peak("double")
+    return Machine(used.name, used.compute_units, *peaks, device.measure_bandwidth())
 
 
 def best(first: Machine, second: Machine) -> Machine:
-    """The better of two measurements: what else the machine did only takes."""
-    return replace(
-        first,
-        single_flops=max(first.single_flops, second.single_flops),
-        double_flops=max(first.double_flops, second.double_flops),
-        bandwidth=max(first.bandwidth, second.bandwidth),
-    )
+    """Return the larger limits of two measurements: other processes only lower them."""
+    limits = ("single_flops", "double_flops", "bandwidth")
+    return replace(first, **{name: max(getattr(first, name), getattr(second, name)) for name in limits})
 
 
 @dataclass(frozen=True)
 class Work:
-    """What a stage needs: operations without padding, and bytes that must move at least once."""
+    """Operations of a stage without padding, and bytes that must move at least once."""
 
     stage: str
     precision: Precision
@@ -63,36 +55,29 @@ class Timed:
 
 
 @dataclass(frozen=True)
-class Share:
-    """A stage's time, its shares of the device's peak and bandwidth, and of whichever of them bounds it."""
+class Share(Work):
+    """A stage's work, its seconds, and its shares of the device's peak and bandwidth.
 
-    stage: str
-    precision: Precision
+    bound: which of the two limits it more. bound_share: the least time that this limit allows, over the time taken.
+    """
+
     seconds: float
-    flops: float
-    bytes: float
     peak_share: float
     bandwidth_share: float
-
-    @property
-    def bound(self) -> Literal["arithmetic", "bandwidth"]:
-        return "arithmetic" if self.peak_share >= self.bandwidth_share else "bandwidth"
-
-    @property
-    def bound_share(self) -> float:
-        """The least time that the device's limits allow, over the time taken."""
-        return max(self.peak_share, self.bandwidth_share)
+    bound: Literal["arithmetic", "bandwidth"]
+    bound_share: float
 
 
 def share(timed: Timed, machine: Machine) -> Share:
-    """How near a stage comes to what the machine allows."""
+    """Return the shares of the machine's limits that a stage reaches."""
     work, seconds = timed.work, timed.seconds
+    peak, bandwidth = work.flops / seconds / machine.peak(work.precision), work.bytes / seconds / machine.bandwidth
+    bound: Literal["arithmetic", "bandwidth"] = "arithmetic" if peak >= bandwidth else "bandwidth"
     return Share(
-        work.stage,
-        work.precision,
-        seconds,
-        work.flops,
-        work.bytes,
-        work.flops / seconds / machine.peak(work.precision),
-        work.bytes / seconds / machine.bandwidth,
+        **vars(work),
+        seconds=seconds,
+        peak_share=peak,
+        bandwidth_share=bandwidth,
+        bound=bound,
+        bound_share=max(peak, bandwidth),
     )

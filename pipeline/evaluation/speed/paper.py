@@ -8,7 +8,8 @@ from kernels import device
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack, expansion
-from pipeline.evaluation.speed import plain, work
+from pipeline.evaluation import plain_numpy
+from pipeline.evaluation.speed import work
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.timing import best_of, timed
 from pipeline.optics.light import Quadrature
@@ -38,7 +39,7 @@ class PaperTable:
 
 
 class Paper:
-    """The paper's tables of one surface. Raises AccuracyError where they would lose their digits."""
+    """The paper's tables of one surface. Raises AccuracyError where float32 would lose their tolerance."""
 
     def __init__(self, field: HeightField, config: Config, repeats: int) -> None:
         self._config = config
@@ -64,23 +65,22 @@ class Paper:
         return PaperTable(table, quadrature, self._stack_s + seconds, sum(launch.seconds for launch in launches))
 
     def stage(self, made: PaperTable) -> Timed:
-        """What the kernel needed for a table and how long it took."""
+        """Return the work of a table's kernel and its seconds."""
         return Timed(work.paper_table(made.pairs, self._stack), made.kernel_s)
 
     def numpy_pair_s(self, nodes: int) -> tuple[float, float]:
-        """Seconds that plain numpy takes for a (node, wavelength) pair, and its agreement with the kernel.
+        """Return the seconds of plain numpy for a (node, wavelength) pair, and its difference from the kernel.
 
-        Agreement is the largest difference over the largest I_p, on a few nodes of the paper's grid.
+        The difference is the largest difference over the largest I_p, on a few nodes of the paper's grid.
         """
         quadrature, uv = self._quadrature(STEP_NM), _some_nodes(nodes)
-        found, seconds = best_of(2, lambda: plain.paper_nodes(self._stack, quadrature, uv))
+        found, seconds = best_of(2, lambda: plain_numpy.paper_nodes(self._stack, quadrature, uv))
         kernel = taylor.node_values(self._stack, quadrature, uv)
         difference = np.max(np.abs(found - kernel)) / max(np.max(np.abs(kernel)), np.finfo(float).tiny)
         return seconds / (nodes * len(quadrature.lambda_nm)), float(difference)
 
     def _quadrature(self, step_nm: float) -> Quadrature:
-        config = self._config
-        return config.radiometry.integrand(step_nm)
+        return self._config.radiometry.integrand(step_nm)
 
 
 def _some_nodes(count: int) -> Array:

@@ -19,7 +19,7 @@ SECOND_ILLUMINANT = "A"
 
 @dataclass(frozen=True)
 class Stages:
-    """Seconds of one bake's stages."""
+    """Seconds of the stages of one bake."""
 
     stack: float
     power_spectrum: float
@@ -32,9 +32,9 @@ class Stages:
 
 @dataclass(frozen=True)
 class TimedBake:
-    """What was made, the times of the fastest bake, and every kernel's best.
+    """A polar table with its stack and power spectrum, the times of the fastest bake, and every kernel's best.
 
-    second_light_s: wavelengths and table of the same spectrum under another illuminant; None for a laser line.
+    second_light_s: wavelengths and table of the same power spectrum under another illuminant; None for a laser line.
     kernel_s: by the kernel's name, its fastest run.
     """
 
@@ -47,7 +47,7 @@ class TimedBake:
 
 
 def bake(setting: Setting, repeats: int) -> TimedBake:
-    """Bakes a table several times over; the kernels must have been compiled."""
+    """Bake a table `repeats` times after one more that warms up."""
     setting.table(setting.power_spectrum(setting.stack()), setting.light)
     with device.timing() as launches:
         runs = [_once(setting) for _ in range(repeats)]
@@ -57,7 +57,7 @@ def bake(setting: Setting, repeats: int) -> TimedBake:
 
 
 def best(first: TimedBake, again: TimedBake) -> TimedBake:
-    """The better times of two bakes of one setting: what else a machine does comes in bursts of seconds."""
+    """Return the shorter times of two bakes of one setting: other processes come in bursts of seconds."""
     lights = [bake.second_light_s for bake in (first, again) if bake.second_light_s is not None]
     return replace(
         first,
@@ -89,7 +89,7 @@ def _fastest(launches: Iterable[Launch]) -> dict[str, float]:
 
 
 def stages(setting: Setting, baked: TimedBake) -> list[Timed]:
-    """What each stage needs and how long it took; of kernels, their best run."""
+    """Return the work of each stage and its seconds; of kernels, their best run."""
     seconds = baked.kernel_s
     spline_s = seconds["filter_azimuths"] + seconds["filter_rings"]
     return [

@@ -1,12 +1,40 @@
-"""Whole runs of the command line, each in a process of its own with a store of its own: what a user waits for."""
+"""Whole runs of the command line, each in a process and a store of its own: warm runs, and the cost of compiling."""
 
 import os
+import shutil
 import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from pipeline.progress import Progress, silent
+
+# a first config, and one of other terms, nodes in s, terms in |w| and window reach
+_FIRST = '[surface]\nrecipe = { kind = "blazed", period_um = 2.5, height_um = 0.25 }\n'
+_NEXT = """\
+[surface]
+recipe = { kind = "elaphe", height_um = 0.8, size_um = 40 }
+[coherence]
+sigma_um = 6
+[accuracy]
+delta_e = 0.5
+"""
+# as configs/elaphe.toml and configs/xenopeltis.toml
+_FIRST_BAKE = """\
+[surface]
+recipe = { kind = "elaphe", across_um = 1.144, height_um = 0.37, seed = 1 }
+[render]
+lights = [{ theta_deg = 0 }, { theta_deg = 30, phi_deg = 180 }]
+"""
+_SECOND_BAKE = """\
+[surface]
+recipe = { kind = "xenopeltis", across_um = 0.55, along_um = 1.55, height_um = 0.3, seed = 1 }
+[render]
+lights = [{ theta_deg = 0 }, { theta_deg = 20 }]
+"""
+_WHOLE_RUNS = 6
 
 
 class RunFailedError(RuntimeError):
@@ -15,7 +43,7 @@ class RunFailedError(RuntimeError):
 
 @dataclass(frozen=True)
 class Spent:
-    """Seconds from a process's start to its end, and processor seconds of it and of what it started."""
+    """Seconds from a process's start to its end, and processor seconds of it and of its children."""
 
     seconds: float
     cpu_s: float
@@ -23,14 +51,14 @@ class Spent:
 
 @dataclass(frozen=True)
 class CommandLine:
-    """How the tool is started: the words before the name of a command."""
+    """The words that start the tool, before the name of a command."""
 
     words: Sequence[str]
 
     def run(self, config: Path, cache: Path | None = None, until: str | None = None) -> Spent:
-        """What a run of a config takes with an empty store.
+        """Run a config with an empty store.
 
-        cache: the user's cache folder, kernels included; None for his own. until: the last stage; None for all.
+        cache: folder of caches, kernels included; None for the user's own. until: the last stage; None for all.
         Raises RunFailedError.
         """
         with tempfile.TemporaryDirectory() as folder:
@@ -39,16 +67,85 @@ class CommandLine:
             environment = dict(os.environ)
             if cache is not None:
                 environment["XDG_CACHE_HOME"] = str(cache)
-                # this process told PoCL where its own cache is
+                # this process has set it for PoCL
                 environment.pop("POCL_CACHE_DIR", None)
-            with tempfile.TemporaryFile("w+", encoding="utf-8") as told:
+            with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
                 started = time.perf_counter()
-                process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=told, env=environment)
-                # unlike getrusage, it tells of this child alone
+                process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment)
+                # unlike getrusage, of this child alone
                 _, status, usage = os.wait4(process.pid, 0)
                 seconds = time.perf_counter() - started
                 process.returncode = os.waitstatus_to_exitcode(status)
                 if process.returncode != 0:
-                    told.seek(0)
-                    raise RunFailedError(told.read().strip().rpartition("\n")[2])
+                    errors.seek(0)
+                    raise RunFailedError(errors.read().strip().rpartition("\n")[2])
         return Spent(seconds, usage.ru_utime + usage.ru_stime)
+
+
+def write_config(folder: Path, name: str, text: str) -> Path:
+    """Write a config of a name, its other keys and sections as `text`, and return its path."""
+    path = folder / f"{name}.toml"
+    path.write_text(f'name = "{name}"\n{text}', encoding="utf-8")
+    return path
+
+
+def warm_run_s(command_line: CommandLine, config: Path, progress: Progress = silent) -> float:
+    """Return the seconds of `run --until table` with an empty store and warm kernels, the fastest of five.
+
+    One more run, the first, fills the kernel cache. Raises RunFailedError.
+    """
+    seconds = []
+    for i in range(_WHOLE_RUNS):
+        seconds.append(command_line.run(config, until="table").seconds)
+        progress("whole runs", (i + 1) / _WHOLE_RUNS)
+    return min(seconds[1:])
+
+
+@dataclass(frozen=True)
+class Compiling:
+    """Costs on a machine whose kernel cache is empty.
+
+    first_s, next_s: processor seconds that compiling adds to the first `run --until table`, and to the next of other
+    terms, nodes and reach. first_bake_s, second_bake_s: seconds of a whole first run, kernels compiled within it, and
+    of a second surface's.
+    """
+
+    first_s: float
+    next_s: float
+    first_bake_s: float
+    second_bake_s: float
+
+
+def measure_compiling(command_line: CommandLine, progress: Progress = silent) -> Compiling:
+    """Measure compiling: processor time of a run with cold kernels less that with warm ones.
+
+    Raises RunFailedError.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        root, cache, done = Path(folder), Path(folder) / "cache", iter(range(1, 9))
+        first, other = write_config(root, "first", _FIRST), write_config(root, "next", _NEXT)
+
+        def cpu_s(path: Path) -> float:
+            spent = command_line.run(path, cache, until="table").cpu_s
+            progress("compiling", next(done) / 8.0)
+            return spent
+
+        def forget_kernels() -> None:
+            shutil.rmtree(cache / "diffract-bake" / "kernels", ignore_errors=True)
+
+        def cold_s(path: Path) -> float:
+            forget_kernels()
+            return cpu_s(path)
+
+        # the first run fills all other caches; other processes only add
+        cpu_s(first)
+        cold = min(cold_s(first), cold_s(first))
+        warm = min(cpu_s(first), cpu_s(first))
+        cold_next = cpu_s(other)
+        warm_next = min(cpu_s(other), cpu_s(other))
+        forget_kernels()
+        bakes = [
+            command_line.run(write_config(root, name, text), cache).seconds
+            for name, text in (("elaphe", _FIRST_BAKE), ("xenopeltis", _SECOND_BAKE))
+        ]
+    return Compiling(cold - warm, max(cold_next - warm_next, 0.0), *bakes)

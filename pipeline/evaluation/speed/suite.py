@@ -1,4 +1,4 @@
-"""Everything that is measured on one surface."""
+"""All measurements of one surface."""
 
 from dataclasses import dataclass, replace
 
@@ -10,12 +10,12 @@ from pipeline.bundle import polar_storage
 from pipeline.bundle.polar_storage import Stored
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
-from pipeline.evaluation.speed import memory, nufft, plain, polar_bake, setting, transforms
+from pipeline.evaluation import plain_numpy
+from pipeline.evaluation.speed import memory, nufft, polar_bake, setting, transforms
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.nufft import NufftRun
-from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM, Paper, PaperTable
+from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM, Paper
 from pipeline.evaluation.speed.polar_bake import Stages, TimedBake
-from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of, timed
 from pipeline.evaluation.speed.transforms import Transforms
 from pipeline.evaluation.speed.truth import MapTruth
@@ -28,11 +28,11 @@ from pipeline.tables.polar.layout import PolarLayout
 PAPER, POLAR, TEXTURES = "paper's tables", "polar table", "polar table as RGBA16F"
 NUFFT = "polar table by FINUFFT"
 NUMPY_PAPER, NUMPY_POLAR = "paper's tables in plain numpy", "polar table in plain numpy"
-METHODS = (PAPER, POLAR, TEXTURES, NUFFT, NUMPY_PAPER, NUMPY_POLAR)
-# 251 k texels beside the paper's 501 x 501; and as many for a grating, whose light lies on a line: fewer azimuths do
+# 251 k texels, as many as the paper's 501 x 501; and as many for a grating, whose light lies on a line of the plane,
+# where fewer azimuths do
 MAIN = PolarLayout(rings=140, azimuths=1792)
 GRATING = PolarLayout(rings=300, azimuths=832, w_terms=12)
-# of the mirror: what is darker is compared with it, not with itself
+# of the mirror: darker samples are compared in absolute terms
 _FLOOR = 1e-7
 _SEED = 3
 _GRATING_STRETCH = 0.5
@@ -40,9 +40,12 @@ _GRATING_STRETCH = 0.5
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: grids as (resolution, step in nm) and layouts, textures, samples, repeats.
+    """Extent of the measurements.
 
-    bakes: of the layout MAIN, before and after the other routes.
+    map_size: pixels of the map's side. paper: (resolution, step in nm) of the paper's tables. polar: layouts of polar
+    tables. textures: numbers of textures. bakes: of the layout MAIN, before and after the other algorithms.
+    repeats: of everything else. numpy_nodes: nodes that plain numpy computes. nufft_azimuths, nufft_repeats: those of
+    FINUFFT. memory: whether peak memory is measured.
     """
 
     map_size: int
@@ -94,11 +97,11 @@ QUICK = replace(
 
 @dataclass(frozen=True)
 class Point:
-    """One way to make one table: what it costs and how far its map is from the exact one.
+    """One table by one algorithm: its cost, and the error of its map.
 
-    settings: resolution and step_nm, or rings and azimuths and, where compressed, textures. texels: of the grid.
-    bytes: of the table as float32, or of its textures.
-    scaled: whether the seconds are those of a sample, scaled by its size.
+    method: one of the names above. settings: resolution and step_nm, or rings, azimuths and w_terms and, where
+    compressed, textures. texels: of the grid. seconds: from the height field to the table. bytes: of the table as
+    float32, or of its textures. scaled: whether the seconds are those of a sample, scaled by its size.
     """
 
     method: str
@@ -112,18 +115,20 @@ class Point:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How two ways to the same numbers differ: of samples over max(sample, 1e-7 of the mirror)."""
+    """Difference of other algorithms from the kernels, of samples over max(sample, 1e-7 of the mirror)."""
 
     nufft: RelativeError | None
     numpy: RelativeError
 
 
 @dataclass(frozen=True)
-class SurfaceBench:
-    """What was measured on a surface.
+class SurfaceSpeed:
+    """The measurements of a surface.
 
-    stages and second_light_s: of the polar table of layout MAIN. memory_bytes: the peak of a process that bakes
-    it. notes: what was left out, and why.
+    samples: (ny, nx). terms, nodes, w_terms: of the polar table of layout MAIN, as are stages and second_light_s.
+    timed: work and seconds of stages and kernels. memory_bytes: the peak of a process that bakes that table. notes:
+    omissions with their reasons. whole_run_s: a process from its start to the table, kernels warm; whole_run_fault:
+    why it was not measured.
     """
 
     name: str
@@ -142,23 +147,22 @@ class SurfaceBench:
     nufft_upsampling: float | None
     memory_bytes: int | None
     notes: list[str]
+    whole_run_s: float | None = None
+    whole_run_fault: str = ""
 
     def point(self, method: str, **settings: float) -> Point | None:
-        """The point of a method at given settings, where it was measured."""
+        """Return the point of a method at given settings, where it was measured."""
         return next((p for p in self.points if p.method == method and p.settings == settings), None)
 
 
 def settings_of(layout: PolarLayout) -> dict[str, float]:
-    """What tells one polar table from another."""
-    return {
-        key: value
-        for key, value in layout.model_dump(include={"rings", "azimuths", "w_terms"}).items()
-        if value != "auto"
-    }
+    """Return the numbers of a layout that are given, not chosen."""
+    given = layout.model_dump(include={"rings", "azimuths", "w_terms"})
+    return {key: value for key, value in given.items() if value != "auto"}
 
 
-def run(config: Config, field: HeightField, effort: Effort, progress: Progress = silent) -> SurfaceBench:
-    """Measures one surface. Its scene, table and accuracy sections are left aside."""
+def run(config: Config, field: HeightField, effort: Effort, progress: Progress = silent) -> SurfaceSpeed:
+    """Measure one surface. The sections scene, table and accuracy of its config are not used."""
     return _Suite(config, field, effort, progress).run()
 
 
@@ -167,28 +171,26 @@ class _Suite:
 
     def __init__(self, config: Config, field: HeightField, effort: Effort, progress: Progress) -> None:
         self._config, self._field, self._effort, self._progress = config, field, effort, progress
+        self._truth = MapTruth(field, config, effort.map_size, progress)
+        self._main = setting.make(field, config, MAIN)
         self._points: list[Point] = []
-        self._stages: list[Timed] = []
         self._notes: list[str] = []
 
-    def run(self) -> SurfaceBench:
-        effort, config, field = self._effort, self._config, self._field
-        self._truth = MapTruth(field, config, effort.map_size, self._progress)
-        main = setting.make(field, config, MAIN)
+    def run(self) -> SurfaceSpeed:
+        effort, main = self._effort, self._main
         baked = polar_bake.bake(main, effort.bakes)
         samples = main.samples(baked.made)
-        numpy_pair_s, numpy_agrees = self._numpy(main, baked, samples)
-        routed, nufft_agrees = self._nufft(main, samples)
+        numpy_pair_s, numpy_agrees = self._numpy(baked, samples)
+        found, nufft_agrees = self._nufft(samples)
         baked = polar_bake.best(baked, polar_bake.bake(main, effort.bakes))
-        self._stages += polar_bake.stages(main, baked)
-        self._polar(main, baked, routed, numpy_pair_s)
-        self._textures(main, baked)
-        self._paper()
+        self._polar(baked, found, numpy_pair_s)
+        self._textures(baked)
+        timed = [*polar_bake.stages(main, baked), *self._paper()]
         measured = transforms.measure(main, effort.repeats)
         self._progress("the stack's transforms", 1.0)
-        return SurfaceBench(
-            name=config.name,
-            samples=field.shape,
+        return SurfaceSpeed(
+            name=self._config.name,
+            samples=self._field.shape,
             sigma_um=main.sigma_um,
             map_size=effort.map_size,
             terms=main.plan.terms,
@@ -197,29 +199,29 @@ class _Suite:
             points=self._points,
             stages=baked.stages,
             second_light_s=baked.second_light_s,
-            timed=self._stages,
+            timed=timed,
             transforms=measured,
             agreement=Agreement(nufft_agrees, numpy_agrees),
-            nufft_upsampling=routed.upsampling if routed else None,
-            memory_bytes=memory.peak_bytes(field, config, MAIN) if effort.memory else None,
+            nufft_upsampling=found.upsampling if found else None,
+            memory_bytes=memory.peak_bytes(self._field, self._config, MAIN) if effort.memory else None,
             notes=self._notes,
         )
 
-    def _numpy(self, main: Setting, baked: TimedBake, samples: Array) -> tuple[float, RelativeError]:
-        """Seconds of plain numpy for a (texel, wavelength) pair, and how it agrees with the table's samples."""
-        rng = np.random.default_rng(_SEED)
+    def _numpy(self, baked: TimedBake, samples: Array) -> tuple[float, RelativeError]:
+        """Seconds of plain numpy for a (texel, wavelength) pair, and its difference from the table's samples."""
+        main, rng = self._main, np.random.default_rng(_SEED)
         rings = np.linspace(1, main.plan.rings.count - 1, self._effort.numpy_nodes).astype(int)
         azimuths = rng.integers(main.plan.azimuths.count, size=len(rings))
         rho, phi = main.plan.rings.rho()[rings], main.plan.azimuths.angles()[azimuths]
         uv = np.stack([rho * np.cos(phi), rho * np.sin(phi)], axis=-1)
-        # what all azimuths of a ring share is made beforehand
+        # shared by all azimuths of a ring, so not timed
         series = [main.series(ring) for ring in rings]
-        coefficients = plain.complex_coefficients(baked.built)
+        coefficients = plain_numpy.complex_coefficients(baked.built)
 
         def texels() -> Array:
             each = zip(rings, uv, series, strict=True)
             return np.stack(
-                [plain.polar_texel(baked.built, coefficients, main.rule_of_ring(r), at, j) for r, at, j in each]
+                [plain_numpy.polar_texel(baked.built, coefficients, main.rule_of_ring(r), at, j) for r, at, j in each]
             )
 
         found, seconds = best_of(2, texels)
@@ -227,43 +229,34 @@ class _Suite:
         self._progress("plain numpy", 1.0)
         return seconds / pairs, relative_error(samples[rings, :, :, azimuths], found, _FLOOR)
 
-    def _nufft(self, main: Setting, samples: Array) -> tuple[NufftRun | None, RelativeError | None]:
+    def _nufft(self, samples: Array) -> tuple[NufftRun | None, RelativeError | None]:
         if not nufft.available():
             self._notes.append("FINUFFT is not installed (the extra `bench`), so there is nothing by it")
             return None, None
-        routed = nufft.run(main, self._effort.nufft_azimuths, self._effort.nufft_repeats)
-        azimuths, half = self._effort.nufft_azimuths, main.plan.azimuths.count // 2
-        here = np.concatenate([samples[..., :azimuths], samples[..., half : half + azimuths]], axis=-1)
+        azimuths, half = self._effort.nufft_azimuths, self._main.plan.azimuths.count // 2
+        found = nufft.run(self._main, azimuths, self._effort.nufft_repeats)
+        same = np.concatenate([samples[..., :azimuths], samples[..., half : half + azimuths]], axis=-1)
         self._progress("FINUFFT", 1.0)
-        return routed, relative_error(routed.samples.astype(np.float64), here, _FLOOR)
+        return found, relative_error(found.samples.astype(np.float64), same, _FLOOR)
 
-    def _polar(self, main: Setting, baked: TimedBake, routed: NufftRun | None, numpy_pair_s: float) -> None:
-        """The polar table over its grid; the same tables by FINUFFT and by plain numpy, which err by as much."""
-        grating = main.plan.azimuths.stretch < _GRATING_STRETCH
+    def _polar(self, baked: TimedBake, by_nufft: NufftRun | None, numpy_pair_s: float) -> None:
+        """Polar tables over their grid; FINUFFT and plain numpy make the same tables with the same errors."""
+        grating = self._main.plan.azimuths.stretch < _GRATING_STRETCH
         layouts = [layout for layout in self._effort.polar if layout != GRATING or grating]
         for i, layout in enumerate(layouts):
-            chosen, made = main, baked
+            chosen, made = self._main, baked
             if layout != MAIN:
                 chosen = setting.make(self._field, self._config, layout)
                 made = polar_bake.bake(chosen, self._effort.repeats)
             pairs = int(np.sum(chosen.rules.count)) * chosen.plan.azimuths.count
-            point = Point(
-                POLAR,
-                settings_of(layout),
-                chosen.plan.texels,
-                made.stages.total,
-                made.table.values.nbytes,
-                self._truth.error(made.table),
-            )
-            self._points += [
-                point,
-                replace(point, method=NUMPY_POLAR, seconds=numpy_pair_s * pairs, scaled=True),
-            ]
-            if routed:
-                self._points.append(replace(point, method=NUFFT, seconds=routed.seconds(chosen), scaled=True))
+            size, error = made.table.values.nbytes, self._truth.error(made.table)
+            point = Point(POLAR, settings_of(layout), chosen.plan.texels, made.stages.total, size, error)
+            self._points += [point, replace(point, method=NUMPY_POLAR, seconds=numpy_pair_s * pairs, scaled=True)]
+            if by_nufft:
+                self._points.append(replace(point, method=NUFFT, seconds=by_nufft.seconds(chosen), scaled=True))
             self._progress("polar tables", (i + 1) / len(layouts))
 
-    def _textures(self, main: Setting, baked: TimedBake) -> None:
+    def _textures(self, baked: TimedBake) -> None:
         """The polar table in few RGBA textures of half floats."""
         most = most_textures(baked.table)
         for count in sorted({min(count, most) for count in self._effort.textures}):
@@ -273,37 +266,28 @@ class _Suite:
                 return polar_storage.store(whole_or_less, "half")
 
             stored, seconds = timed(store)
-            self._points.append(
-                Point(
-                    TEXTURES,
-                    {**settings_of(MAIN), "textures": count},
-                    main.plan.texels,
-                    baked.stages.total + seconds,
-                    stored.values.nbytes,
-                    self._truth.error_of_textures(stored.textures),
-                )
-            )
+            settings, error = {**settings_of(MAIN), "textures": count}, self._truth.error_of_textures(stored.textures)
+            total = baked.stages.total + seconds
+            self._points.append(Point(TEXTURES, settings, self._main.plan.texels, total, stored.values.nbytes, error))
         self._progress("textures", 1.0)
 
-    def _paper(self) -> None:
-        """The paper's tables over their resolution and step, by the kernel and by plain numpy."""
+    def _paper(self) -> list[Timed]:
+        """The paper's tables over their resolution and step, by the kernel and by plain numpy; the largest's work."""
         try:
             paper = Paper(self._field, self._config, self._effort.repeats)
         except AccuracyError as error:
             self._notes.append(f"no tables of the paper's: {error}")
-            return
+            return []
         numpy_pair_s, agreement = paper.numpy_pair_s(self._effort.numpy_nodes)
         self._notes.append(f"the paper's kernel and plain numpy differ by {agreement:.0e} of the largest I_p")
+        work: list[Timed] = []
         for i, (resolution, step_nm) in enumerate(self._effort.paper):
             made = paper.table(resolution, step_nm)
             if (resolution, step_nm) == max(self._effort.paper):
-                self._stages.append(paper.stage(made))
-            point = self._paper_point(made, resolution, step_nm)
+                work.append(paper.stage(made))
+            settings, size = {"resolution": float(resolution), "step_nm": step_nm}, made.table.values.nbytes
+            point = Point(PAPER, settings, resolution**2, made.seconds, size, self._truth.error(made.table))
             numpy_s = numpy_pair_s * made.pairs
             self._points += [point, replace(point, method=NUMPY_PAPER, seconds=numpy_s, scaled=True)]
             self._progress("the paper's tables", (i + 1) / len(self._effort.paper))
-
-    def _paper_point(self, made: PaperTable, resolution: int, step_nm: float) -> Point:
-        settings = {"resolution": float(resolution), "step_nm": step_nm}
-        size = made.table.values.nbytes
-        return Point(PAPER, settings, resolution**2, made.seconds, size, self._truth.error(made.table))
+        return work

@@ -1,12 +1,12 @@
-"""The families of cells: heights, pitches, sizes, shapes, windows, surfaces, tables."""
+"""The families of test cases: heights, pitches, sizes, shapes, windows, surfaces, tables."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from pipeline.diffraction.dft_stack import Basis
-from pipeline.evaluation.stability.cell import Cell, Kind, Precision
+from pipeline.evaluation.stability.case import Kind, Precision, StressCase
 
-_BASE = Cell("", "device", "chebyshev", "float32", "noise", 0.5, (128, 128), (0.1, 0.1), 3.2)
+_BASE = StressCase("", "device", "chebyshev", "float32", "noise", 0.5, (128, 128), (0.1, 0.1), 3.2)
 _SERIES: tuple[tuple[Basis, Precision], ...] = (
     ("taylor", "float32"),
     ("taylor", "float64"),
@@ -14,28 +14,28 @@ _SERIES: tuple[tuple[Basis, Precision], ...] = (
     ("chebyshev", "float64"),
 )
 # where Taylor's series in float64 has failed, and where Chebyshev's in float32 holds
-TAYLOR_ENDS_UM, TALLEST_UM = 2.0, 10.0
+TAYLOR_FAILS_UM, TALLEST_UM = 2.0, 10.0
 _SERIES_HEIGHTS_UM = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 7.0, 10.0)
 # heights that Taylor tables of 1e-4 take, and one that they must refuse
 _TAYLOR_HEIGHTS_UM = (1e-3, 0.1, 0.3, 0.5, 2.0)
 
 
-def cells(quick: bool = False) -> list[Cell]:
-    """The sweep, or a part of it that takes seconds."""
-    return [cell for family in _FAMILIES for cell in family(quick)]
+def cases(quick: bool = False) -> list[StressCase]:
+    """Return the sweep, or a part of it that takes seconds."""
+    return [case for family in _FAMILIES for case in family(quick)]
 
 
-def tall() -> list[Cell]:
-    """The cells that `judging.criterion` reads."""
-    return [cell for cell in _by_height(quick=True) if cell.height_um in (TAYLOR_ENDS_UM, TALLEST_UM)]
+def tall() -> list[StressCase]:
+    """Return the cases that `verdict.criterion` reads."""
+    return [case for case in _by_height(quick=True) if case.height_um in (TAYLOR_FAILS_UM, TALLEST_UM)]
 
 
-def _by_height(quick: bool) -> Iterator[Cell]:
+def _by_height(quick: bool) -> Iterator[StressCase]:
     heights = (1e-3, 0.1, 0.5, 2.0, 10.0) if quick else _SERIES_HEIGHTS_UM
     for height in heights:
         for basis, precision in _SERIES:
             yield replace(
-                _BASE, family="height, series", way="series", basis=basis, precision=precision, height_um=height
+                _BASE, family="height, series", algorithm="series", basis=basis, precision=precision, height_um=height
             )
     for height in (1e-3, 0.5, 10.0) if quick else (1e-3, 0.03, 0.5, 2.0, 5.0, 10.0):
         yield from _on_device(replace(_BASE, family="height", height_um=height), with_taylor=False)
@@ -43,28 +43,28 @@ def _by_height(quick: bool) -> Iterator[Cell]:
         yield replace(_BASE, family="height, I_p", basis="taylor", height_um=height)
 
 
-def _on_device(cell: Cell, with_taylor: bool = True) -> Iterator[Cell]:
-    """A cell in every way that stages run; the paper's tables at a height that they take."""
-    yield replace(cell, precision="float32")
-    yield replace(cell, precision="float64")
+def _on_device(case: StressCase, with_taylor: bool = True) -> Iterator[StressCase]:
+    """A case by every algorithm that stages run; the paper's tables at a height that they take."""
+    yield replace(case, precision="float32")
+    yield replace(case, precision="float64")
     if with_taylor:
-        yield replace(cell, basis="taylor", height_um=min(cell.height_um, 0.1))
+        yield replace(case, basis="taylor", height_um=min(case.height_um, 0.1))
 
 
-def _by_pitch(quick: bool) -> Iterator[Cell]:
+def _by_pitch(quick: bool) -> Iterator[StressCase]:
     for pitch in (0.005, 0.2) if quick else (0.005, 0.01, 0.02, 0.05, 0.2):
         sigma = 0.25 * _BASE.shape[1] * pitch
         yield from _on_device(replace(_BASE, family="pitch", pitch_um=(pitch, pitch), sigma_um=sigma))
 
 
-def _by_size(quick: bool) -> Iterator[Cell]:
+def _by_size(quick: bool) -> Iterator[StressCase]:
     for n in (64, 512) if quick else (64, 256, 1024, 4096):
         yield from _on_device(
             replace(_BASE, family="size", shape=(n, n), pitch_um=(0.02, 0.02), sigma_um=0.005 * n), n <= 1024
         )
 
 
-def _by_shape(quick: bool) -> Iterator[Cell]:
+def _by_shape(quick: bool) -> Iterator[StressCase]:
     oblong: Iterable[tuple[tuple[int, int], tuple[float, float]]] = (
         ((65, 33), (0.1, 0.2)),
         ((64, 256), (0.1, 0.1)),
@@ -75,21 +75,21 @@ def _by_shape(quick: bool) -> Iterator[Cell]:
         yield from _on_device(replace(_BASE, family="shape", shape=shape, pitch_um=pitch, sigma_um=1.5))
 
 
-def _by_window(quick: bool) -> Iterator[Cell]:
+def _by_window(quick: bool) -> Iterator[StressCase]:
     """From one pixel, which must be refused, over two to twice the patch's width."""
     for sigma in (0.1, 0.2, 12.8) if quick else (0.1, 0.2, 0.4, 6.4, 12.8, 25.6):
         yield from _on_device(replace(_BASE, family="window", sigma_um=sigma))
 
 
-def _by_surface(quick: bool) -> Iterator[Cell]:
+def _by_surface(quick: bool) -> Iterator[StressCase]:
     kinds: tuple[Kind, ...] = ("flat", "spike", "steps") if quick else ("flat", "spike", "steps", "hills", "noise")
     for kind in kinds:
         for height in (10.0,) if quick else (0.1, 2.0, 10.0):
             yield from _on_device(replace(_BASE, family="surface", kind=kind, height_um=height), height == 0.1)
 
 
-def _by_table(quick: bool) -> Iterator[Cell]:
-    base = replace(_BASE, family="table", way="table", shape=(64, 64), height_um=0.3, sigma_um=1.6)
+def _by_table(quick: bool) -> Iterator[StressCase]:
+    base = replace(_BASE, family="table", algorithm="table", shape=(64, 64), height_um=0.3, sigma_um=1.6)
     yield base
     if quick:
         return

@@ -1,0 +1,126 @@
+"""`bench speed`: all surfaces, kernels' constants, whole runs and criteria, and the files that hold them."""
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pipeline.config.models import Config
+from pipeline.evaluation import results
+from pipeline.evaluation.check import Check
+from pipeline.evaluation.speed import checks, constants, machine, memory, processes, setting, suite, truth
+from pipeline.evaluation.speed.constants import Constant
+from pipeline.evaluation.speed.machine import Machine, share
+from pipeline.evaluation.speed.processes import CommandLine, RunFailedError
+from pipeline.evaluation.speed.suite import FULL, MAIN, QUICK, SurfaceSpeed
+from pipeline.evaluation.stability import sweep, verdict
+from pipeline.progress import Progress
+from pipeline.stages import run as stages
+from pipeline.stages import surface
+from pipeline.store.store import Store
+from pipeline.surface.heightfield import HeightField
+
+# recipes, each with its defaults, where no config is named
+_BUILT_IN = ("elaphe", "xenopeltis", "blazed")
+_COLUMNS = (
+    *("surface", "method", "rings", "azimuths", "w_terms", "resolution", "step_nm", "textures", "texels"),
+    *("seconds", "scaled", "bytes", "mean_delta_e", "percentile_99", "maximum"),
+)
+
+
+@dataclass(frozen=True)
+class SpeedResults:
+    """One run on one machine. constants: of the first surface's kernels, empty where not measured."""
+
+    machine: Machine
+    surfaces: list[SurfaceSpeed]
+    constants: list[Constant]
+    checks: list[Check]
+
+    def document(self) -> dict[str, Any]:
+        """Return all that was measured, for JSON; stages with their shares of the machine's limits."""
+        surfaces = [
+            {**results.plain(each), "timed": results.plain([share(timed, self.machine) for timed in each.timed])}
+            for each in self.surfaces
+        ]
+        return results.document(self.checks, machine=self.machine, surfaces=surfaces, constants=self.constants)
+
+    def files(self) -> dict[str, str | bytes]:
+        """Return speed.json, speed.csv (a row a table) and speed.png by name."""
+        from pipeline.evaluation.plots import speed_plots
+
+        return {
+            "speed.json": results.json_text(self.document()),
+            "speed.csv": results.csv_text(list(self._rows()), _COLUMNS),
+            "speed.png": speed_plots.error_against_cost(self.surfaces, truth.EXPOSURE_RU),
+        }
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        for each in self.surfaces:
+            for point in each.points:
+                row = {"surface": each.name, **vars(point), **point.settings, "mean_delta_e": point.error.mean}
+                row |= {"percentile_99": point.error.percentile_99, "maximum": point.error.maximum}
+                yield {column: row[column] for column in _COLUMNS if column in row}
+
+
+@contextmanager
+def built_in() -> Iterator[tuple[Path, ...]]:
+    """Give paths of configs of three synthetic surfaces for as long as they are needed."""
+    with tempfile.TemporaryDirectory() as folder:
+        recipes = ((name, f'[surface]\nrecipe = {{ kind = "{name}" }}\n') for name in _BUILT_IN)
+        yield tuple(processes.write_config(Path(folder), name, text) for name, text in recipes)
+
+
+def run(
+    configs: Sequence[tuple[Config, Path]],
+    quick: bool,
+    store: Store,
+    command_line: CommandLine,
+    progress: Progress,
+    note: Callable[[str], None],
+) -> SpeedResults:
+    """Measure all surfaces and the machine.
+
+    configs: with the files that hold them. quick: smaller maps and samples; no processes, no large scan.
+    command_line: how whole runs are started. note: called with the name of each part before it begins.
+    """
+    note("device:")
+    limits, found = machine.measure(), []
+    for config, path in configs:
+        note(f"{config.name}:")
+        each = suite.run(config, _field(config, store, progress), QUICK if quick else FULL, progress)
+        found.append(each if quick else _with_whole_run(each, command_line, path, progress))
+        limits = machine.best(limits, machine.measure())
+    judged = [check for each in found for check in checks.of_surface(each, limits)]
+    judged += verdict.criterion(verdict.sweep(sweep.tall()))
+    if quick:
+        return SpeedResults(limits, found, [], [*judged, checks.of_large_scan(None), *checks.of_compiling(None)])
+    note("constants of the kernels:")
+    first = configs[0][0]
+    inputs = setting.make(_field(first, store, progress), first, MAIN)
+    buys = constants.measure(inputs, FULL.bakes, progress)
+    note(f"{memory.LARGE_SIDE} x {memory.LARGE_SIDE} samples, 64 terms:")
+    judged.append(checks.of_large_scan(memory.peak_bytes(*memory.large_scan(), MAIN)))
+    note("a new machine:")
+    return SpeedResults(limits, found, buys, [*judged, *_compiling(command_line, progress)])
+
+
+def _field(config: Config, store: Store, progress: Progress) -> HeightField:
+    made = stages.execute(config, stages.plan(config, store, "surface"), store, progress)
+    return surface.load(store.open("surface", made["surface"].key))
+
+
+def _with_whole_run(found: SurfaceSpeed, command_line: CommandLine, path: Path, progress: Progress) -> SurfaceSpeed:
+    try:
+        return replace(found, whole_run_s=processes.warm_run_s(command_line, path, progress))
+    except RunFailedError as error:
+        return replace(found, whole_run_fault=f"run --until table failed: {error}")
+
+
+def _compiling(command_line: CommandLine, progress: Progress) -> list[Check]:
+    try:
+        return checks.of_compiling(processes.measure_compiling(command_line, progress))
+    except RunFailedError as error:
+        return checks.of_compiling(None, f"a run on a new kernel cache failed: {error}")
