@@ -30,7 +30,7 @@ def _out_option(default: str, files: str) -> Callable[..., Any]:
 
 @click.group("bench")
 def bench_command() -> None:
-    """Measure the tool: its speed, its numerical stability, and its figures beside the literature's."""
+    """Measure the tool: its speed, its numerical stability, and its figures compared with the literature's."""
 
 
 @bench_command.command("speed")

@@ -3,6 +3,8 @@
 A second implementation of what the kernels compute, and the baseline of `bench speed`.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,6 +43,15 @@ def _transforms(built: Stack, coefficients: Complex, f_per_um: Array) -> Complex
     """F_n(f) (terms,) under the window, [D14] eq. 8; None beyond the scan's Nyquist limits."""
     found = coefficients_about(built, f_per_um)
     return None if found is None else np.asarray(np.einsum("y,x,yxn->n", *found[1:], coefficients[found[0]]))
+
+
+def chebyshev_terms(t: Array) -> Iterator[Array]:
+    """Give T_0(t), T_1(t), ... without end, each an array as `t`, in [-1, 1]."""
+    before, term = t, np.ones_like(t)
+    while True:
+        yield term
+        # T_-1 = T_1 = t
+        before, term = term, 2.0 * t * term - before
 
 
 def paper_nodes(built: Stack, quadrature: Quadrature, uv: Array) -> Array:

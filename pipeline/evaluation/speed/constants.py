@@ -1,4 +1,4 @@
-"""What each compile-time constant of a polar table's kernels buys: its kernels' time with another value."""
+"""Gain of each compile-time constant of a polar table's kernels: their time with another value."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ _KERNELS = {
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant's value here, another one, and the seconds of its kernels with either."""
+    """A constant's value, another value, and the seconds of its kernels with each."""
 
     name: str
     value: int
@@ -28,7 +28,10 @@ class Constant:
 
 
 def measure(setting: Setting, repeats: int, progress: Progress = silent) -> list[Constant]:
-    """Every constant beside another value; both are timed one after the other, for a machine's pace changes."""
+    """Time every constant with another value, both in turn, because a machine's pace changes.
+
+    repeats: bakes for each value, of which the fastest launch of each kernel counts.
+    """
     found = []
     for done, (name, kernels) in enumerate(_KERNELS.items(), 1):
         value, other = blocks.chosen(name)[name], blocks.OTHERS[name]

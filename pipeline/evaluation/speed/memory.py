@@ -1,6 +1,7 @@
 """Peak memory of a bake, stack to table, in a process of its own.
 
-Run as a script it is that process: a file of heights, its pitch along x and y, a config and a layout as JSON.
+As a script it is that process; its arguments are a file of heights, their pitch along x and y, a config and a layout
+as JSON.
 """
 
 import re
@@ -25,18 +26,18 @@ _SEED = 5
 
 
 def peak_bytes(field: HeightField, config: Config, layout: PolarLayout) -> int:
-    """The most memory that a fresh process held while it made a height field's stack, spectrum and table."""
+    """Return the peak memory, bytes, of a fresh process that makes stack, power spectrum and table of a surface."""
     with tempfile.TemporaryDirectory() as folder:
         heights = Path(folder) / "heights.npy"
         np.save(heights, field.heights_um)
         command = [sys.executable, "-m", "pipeline.evaluation.speed.memory", str(heights), *map(str, field.pitch_um)]
         models = [model.model_dump_json() for model in (config, layout)]
-        told = subprocess.run([*command, *models], capture_output=True, text=True, check=True)
-    return int(told.stdout)
+        finished = subprocess.run([*command, *models], capture_output=True, text=True, check=True)
+    return int(finished.stdout)
 
 
 def large_scan() -> tuple[HeightField, Config]:
-    """A rough surface of 4096 x 4096 samples."""
+    """Return a rough surface of 4096 x 4096 samples that needs 64 terms, and its config."""
     half = _LARGE_HALF_RANGE_UM
     heights = np.random.default_rng(_SEED).uniform(-half, half, (LARGE_SIDE, LARGE_SIDE))
     config = Config(name="large", surface=SurfaceSource(recipe=Mirror(kind="mirror")))
@@ -44,7 +45,7 @@ def large_scan() -> tuple[HeightField, Config]:
 
 
 def _bake(arguments: list[str]) -> int:
-    """Makes a table as `arguments` say and gives the peak of this process's memory, bytes."""
+    """Make a table and return the peak memory of this process, bytes."""
     heights, pitch_x, pitch_y, config, layout = arguments
     field = HeightField(np.load(heights), (float(pitch_x), float(pitch_y)))
     made, chosen = setting.first_bake(
@@ -55,7 +56,7 @@ def _bake(arguments: list[str]) -> int:
 
 
 def _high_water_bytes() -> int:
-    """This process's own peak: getrusage's starts at what the parent held when it called exec."""
+    """This process's own peak: getrusage's starts with the parent's memory at exec."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     found = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
     assert found is not None

@@ -1,7 +1,7 @@
-"""The polar table by FINUFFT: what the best library route to the same numbers costs.
+"""The polar table by FINUFFT, the fastest library for the same sums: the baseline of `bench speed`.
 
 Every F_n(f), f = (u, v) / lambda, of every texel and wavelength is a 2D sum over uniform samples at a nonuniform
-frequency, a type-2 transform. How FINUFFT is made to do its best:
+frequency, a type-2 transform. FINUFFT is used as follows, to its advantage:
 
 - The patch repeats under the window, and its copies meet other phases at every f. So the patch is laid side by side
   under the whole window and transformed once; a window folded onto one patch would need other samples at every f.
@@ -12,8 +12,8 @@ frequency, a type-2 transform. How FINUFFT is made to do its best:
 - In the DFT domain the window's few weights over the patch's own coefficients would do. That is this project's
   kernel: FINUFFT's interpolation has a window of its own and cannot apply the Gaussian one.
 
-It runs on some of the azimuths, side by side as in the whole. What grows with the points is scaled by their number;
-what does not (terms, FFTs) counts once, as if the memory held the transforms of all points together.
+It runs on adjacent azimuths, a part of all. Time that grows with the points is scaled by their number; the rest
+(terms, FFTs) counts once, as if the memory held the transforms of all points together.
 """
 
 import os
@@ -37,7 +37,7 @@ _UPSAMPLING = (1.25, 2.0)
 
 
 def available() -> bool:
-    """Whether the library is installed: it is an extra."""
+    """Return whether the library is installed (the extra `bench`)."""
     return find_spec("finufft") is not None
 
 
@@ -45,9 +45,9 @@ def available() -> bool:
 class NufftRun:
     """FINUFFT on some of a table's points.
 
-    fixed_s: terms and their FFTs. transform_s, integral_s: seconds a point, for all terms. points: those transformed,
-    (texel, wavelength) pairs of half a turn. samples: X, Y, Z (rings, 3, w nodes, 2 azimuths), those half a turn on
-    last.
+    fixed_s: terms and their FFTs. transform_s, integral_s: seconds a point, for all terms. points: number of (texel,
+    wavelength) pairs transformed, of half a turn. upsampling: the faster factor. samples: X, Y, Z (rings, 3, w nodes,
+    2 azimuths), the opposite half turn last.
     """
 
     fixed_s: float
@@ -58,17 +58,17 @@ class NufftRun:
     samples: NDArray[np.float32]
 
     def seconds(self, setting: Setting) -> float:
-        """What a whole table takes."""
+        """Return the seconds of a whole table."""
         return self.fixed_s + (self.transform_s + self.integral_s) * points_of(setting)
 
 
 def points_of(setting: Setting) -> int:
-    """Frequencies at which a table needs its transforms: wavelengths of all rings, over half of the azimuths."""
+    """Return the number of frequencies of a table: wavelengths of all rings, over half of the azimuths."""
     return int(np.sum(setting.rules.count)) * setting.plan.azimuths.count // 2
 
 
 def run(setting: Setting, azimuths: int, repeats: int) -> NufftRun:
-    """FINUFFT on the first `azimuths` of a setting's table, everything the best of `repeats`."""
+    """Time FINUFFT on the first `azimuths` of a table, each part the best of `repeats`."""
     modes, modes_s = best_of(repeats, lambda: nufft_modes.make(setting))
     fx, fy = _frequencies(setting, azimuths)
     tried = [_transform(modes, fx, fy, upsampling, repeats) for upsampling in _UPSAMPLING]

@@ -1,4 +1,4 @@
-"""What FINUFFT transforms: every Chebyshev term under the window, low-passed to the frequencies that views reach."""
+"""Input of FINUFFT: every Chebyshev term under the window, low-passed to the frequencies that views reach."""
 
 import os
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from pipeline.evaluation.plain_numpy import chebyshev_terms
 from pipeline.evaluation.speed.setting import AMPLITUDE, Setting
 from pipeline.optics.coherence import reach_sigmas, sigma_f, window
 
@@ -26,7 +27,7 @@ class Modes:
 
 
 def make(setting: Setting) -> Modes:
-    """The terms that the budget needs, where the window exceeds what it may be cut at."""
+    """Return the terms that the budget needs, over the window as far as its cut."""
     field = setting.field
     ny, nx = field.shape
     my, mx = (
@@ -39,16 +40,13 @@ def make(setting: Setting) -> Modes:
     under = np.multiply.outer(g_y / g_y.sum(), g_x / g_x.sum()).astype(np.float32)
     values = np.empty((setting.plan.terms, len(g_y), len(g_x)), np.complex64)
     t = np.fft.ifftshift(field.heights_um / field.half_range_um)
-    before, term = np.zeros_like(t), np.ones_like(t)
-    for n in range(len(values)):
-        values[n] = under * _low_passed(term.astype(np.float32), (my, mx))[np.ix_(rows, columns)]
-        # T_1 = t; T_(n+1) = 2 t T_n - T_(n-1)
-        before, term = term, (t if n == 0 else 2.0 * t * term - before)
+    for value, term in zip(values, chebyshev_terms(t), strict=False):
+        value[:] = under * _low_passed(term.astype(np.float32), (my, mx))[np.ix_(rows, columns)]
     return Modes(values, (spacing_x, spacing_y))
 
 
 def _samples(n: int, size_um: float, setting: Setting) -> int:
-    """Samples of one period, as few as carry every frequency that a view reaches under the window."""
+    """The fewest samples of one period that carry every frequency that a view reaches under the window."""
     edge = setting.r_max_per_um + reach_sigmas(AMPLITUDE) * sigma_f(setting.sigma_um)
     return min(n, int(fft.next_fast_len(ceil(2.0 * edge * size_um), real=True)))
 

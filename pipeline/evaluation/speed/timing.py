@@ -8,14 +8,14 @@ T = TypeVar("T")
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
-    """What `work` gives, and the seconds it took."""
+    """Return the result of `work` and its seconds."""
     started = time.perf_counter()
     result = work()
     return result, time.perf_counter() - started
 
 
 def best_of(repeats: int, work: Callable[[], T]) -> tuple[T, float]:
-    """What `work` gives, and the shortest of several times: what else the machine did only adds."""
+    """Return the result of `work` and the shortest of `repeats` times: other processes only add."""
     result, best = timed(work)
     for _ in range(repeats - 1):
         result, seconds = timed(work)

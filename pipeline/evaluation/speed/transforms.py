@@ -1,9 +1,8 @@
-"""The stack's transforms by three routes: the kernel, FFTW and scipy, each in both precisions."""
+"""The stack's transforms by three libraries: the kernel, FFTW and scipy, each in both precisions."""
 
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +11,20 @@ from scipy import fft
 from kernels.dft_stack import Kept
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Stack
+from pipeline.evaluation.plain_numpy import chebyshev_terms
+from pipeline.evaluation.speed.machine import Precision
 from pipeline.evaluation.speed.setting import AMPLITUDE, Setting
 from pipeline.evaluation.speed.timing import best_of
 from pipeline.fourier.term_transforms import KeptCoefficients, transform
 
-Precision = Literal["single", "double"]
 _REAL: dict[Precision, np.dtype[Any]] = {"single": np.dtype(np.float32), "double": np.dtype(np.float64)}
 
 
 @dataclass(frozen=True)
 class Transforms:
-    """Seconds of one Chebyshev stack by each route, its terms included, warm.
+    """Seconds of one Chebyshev stack by each library, its terms included, warm.
 
-    differences: the largest of FFTW's and of scipy's coefficients from the kernel's; a mirror's is 1.
+    differences: the largest of FFTW's and of scipy's coefficients from the kernel's; that of a mirror is 1.
     """
 
     precision: Precision
@@ -37,7 +37,7 @@ class Transforms:
 
 
 def measure(setting: Setting, repeats: int) -> list[Transforms]:
-    """Both precisions of the stack that a surface's polar table is made of."""
+    """Time both precisions of the stack of a surface's polar table, each the best of `repeats`."""
     return [_measure(setting, precision, repeats) for precision in _REAL]
 
 
@@ -53,16 +53,16 @@ def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms
 
     def by_fftw() -> NDArray[Any]:
         out = np.empty(shape, real)
-        transform(_polynomials(t), kept, out)
+        transform(chebyshev_terms(t), kept, out)
         return out
 
     def by_scipy() -> NDArray[Any]:
         out, places = np.empty(shape, real), KeptCoefficients(t.shape, kept)
-        for n, term in zip(range(terms), _polynomials(t), strict=False):
+        for n, term in zip(range(terms), chebyshev_terms(t), strict=False):
             places.put(fft.rfft2(term.astype(real), workers=os.cpu_count()), out[..., n])
         return out
 
-    # plans are made, or read from wisdom, once
+    # plans are measured, or read from wisdom, once
     by_fftw()
     built, kernel_s = best_of(repeats, by_kernel)
     fftw, fftw_s = best_of(repeats, by_fftw)
@@ -72,15 +72,6 @@ def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms
 
 
 def kept_of(built: Stack) -> Kept:
-    """The frequencies of a stack."""
+    """Return the frequencies that a stack holds."""
     columns = built.coefficients.shape[1]
     return Kept(built.row_zero, columns - built.column_zero - 1, built.column_zero)
-
-
-def _polynomials(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    """T_0(t), T_1(t), ... without end."""
-    before, term = t, np.ones_like(t)
-    while True:
-        yield term
-        # T_-1 = T_1 = t
-        before, term = term, 2.0 * t * term - before

@@ -1,4 +1,4 @@
-"""The map that errors are stated over, with its exact colours: computed once a surface."""
+"""The exact BRDF map over which the errors of tables are measured."""
 
 import numpy as np
 
@@ -20,9 +20,9 @@ _NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 class MapTruth:
-    """The exact BRDF map of a surface under one window, lit at normal incidence, and how far tables are from it.
+    """The exact BRDF map of a surface under one window, lit at normal incidence, computed once.
 
-    `size` is that of the map in pixels, 301 (pipeline.accuracy.checks.MAP_SIZE) where errors are to be quoted.
+    size: of the map in pixels, 301 (pipeline.accuracy.checks.MAP_SIZE) for errors that are to be quoted.
     """
 
     def __init__(self, field: HeightField, config: Config, size: int, progress: Progress = silent) -> None:
@@ -34,11 +34,11 @@ class MapTruth:
         self._exact = exact / self._unit
 
     def error(self, table: PolarTable | TaylorTable) -> ColourError:
-        """CIELAB errors of a table's map at 7500 RU."""
+        """Return the CIELAB errors of a table's map at 7500 RU."""
         return self._compare(table_evaluator(table, self._config.radiometry)(self._wi, self._wr))
 
     def error_of_textures(self, textures: Textures) -> ColourError:
-        """CIELAB errors of a compressed table's map at 7500 RU."""
+        """Return the CIELAB errors of a compressed table's map at 7500 RU."""
         uv = geometry.uvw(self._wi, self._wr)[:, :2]
         g = textures.envelope.at(np.hypot(uv[:, 0], uv[:, 1]))
         return self._compare(

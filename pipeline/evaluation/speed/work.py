@@ -1,6 +1,6 @@
-"""How much the stages need: operations that the algorithm asks for, and bytes that must move at least once.
+"""Work of the stages: operations of the algorithm, and bytes that must move at least once.
 
-Padding to whole vectors is no work, and a fused multiply-add is two operations. Bytes are those of inputs and
+Padding to whole vectors does not count, and a fused multiply-add is two operations. Bytes are those of inputs and
 outputs, each once, as if caches held all that is read again.
 """
 
@@ -20,12 +20,12 @@ _SPLINE_TAPS = 12
 
 
 def taps(built: Stack) -> int:
-    """Coefficients under the window."""
+    """Return the number of coefficients under the window."""
     return (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
 
 
 def stack(field: HeightField, built: Stack) -> Work:
-    """A transform of a real field for every term: along x for every row, along y for the columns kept."""
+    """Count a transform of a real field for every term: along x for every row, along y for the columns kept."""
     ny, nx = field.shape
     columns = built.coefficients.shape[1] - built.column_zero
     flops = built.terms * (2.5 * ny * nx * log2(nx) + 5.0 * columns * ny * log2(ny))
@@ -39,7 +39,7 @@ def _nbytes(built: Stack) -> float:
 
 
 def power_spectrum(setting: Setting, built: Stack, made: PolarPowerSpectrum) -> Work:
-    """polar_spectrum: the window over every term, then the series at every node in s, for half of the azimuths."""
+    """Count the window over every term, then the series at every node in s, for half of the azimuths."""
     pairs = _pairs_in_band(made)
     flops = 2.0 * pairs * built.terms * 2 * (taps(built) + setting.plan.s_nodes)
     return Work("power spectrum", "single", flops, _nbytes(built) + made.values.nbytes)
@@ -53,7 +53,7 @@ def _pairs_in_band(made: PolarPowerSpectrum) -> int:
 
 
 def build_operator(setting: Setting) -> Work:
-    """At every point: cardinal functions at the nodes of w, the radii about it; wavelengths over the points."""
+    """Count, at every point, cardinal functions at nodes of w and at radii; then wavelengths over the points."""
     s, w = setting.plan.s_nodes, setting.plan.w_terms
     points, between, taken = _points(setting)
     wavelengths = float(np.sum(setting.rules.count))
@@ -62,7 +62,7 @@ def build_operator(setting: Setting) -> Work:
 
 
 def apply_operator(setting: Setting, made: PolarPowerSpectrum, table: PolarTable) -> Work:
-    """At every point: E over r where it lies between radii, then over s; every ring's X, Y, Z; w's series at last."""
+    """Count, at every point, E over r where it lies between radii, then over s; X, Y, Z of every ring; w's series."""
     s, w = setting.plan.s_nodes, setting.plan.w_terms
     points, between, taken = _points(setting)
     each = between * ORDER * s + points * s * w + taken * 3 * w + setting.plan.rings.count * 3 * w * w
@@ -71,7 +71,7 @@ def apply_operator(setting: Setting, made: PolarPowerSpectrum, table: PolarTable
 
 
 def _points(setting: Setting) -> tuple[float, float, float]:
-    """Points of all groups of rings, those of them between radii, and what all rings together take of them."""
+    """Number of points of all groups of rings, of those between radii, and of those that all rings take together."""
     points, taken = setting.points, 0
     low, high = (points.stretch * kappa for kappa in setting.rules.kappa_ends_per_um)
     lines = np.split(points.kappa_per_um, points.first[1:])
@@ -83,15 +83,15 @@ def _points(setting: Setting) -> tuple[float, float, float]:
 
 
 def splines(table: PolarTable) -> Work:
-    """A symmetric filter of 12 taps on either side around the turn, then one across the rings."""
+    """Count a symmetric filter of 12 taps on either side around the turn, then one across the rings."""
     flops = 2.0 * table.values.size * (3 * _SPLINE_TAPS + 1)
     return Work("splines", "single", flops, 4.0 * table.values.nbytes)
 
 
 def paper_table(pairs: float, built: Stack) -> Work:
-    """taylor_table: multiplications and additions of eq. 8, 11 and 12 of [D14], for half of (node, wavelength) pairs.
+    """Count taylor_table: eq. 8, 11 and 12 of [D14] for half of the (node, wavelength) pairs.
 
-    Its bytes are the stack's; beside its arithmetic nothing of them counts.
+    Its bytes are those of the stack, which are negligible beside its arithmetic.
     """
     terms = built.terms
     per_pair = taps(built) * 2 * terms + 2 * terms * terms + 3 * (2 * terms - 1)
