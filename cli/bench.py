@@ -144,6 +144,7 @@ def _print_checks(checks: "Sequence[Check]") -> None:
             "measured": lambda check: check.measured or "-",
             "expected": lambda check: check.expected or "-",
             "verdict": lambda check: check.verdict,
+            "source": lambda check: check.source,
             "of": lambda check: f"{check.what}: {check.remark}" if check.remark else check.what,
         },
     )

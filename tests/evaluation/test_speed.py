@@ -1,6 +1,8 @@
 """Other algorithms for the same numbers, counts of work, and criteria."""
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -13,7 +15,7 @@ from pipeline.evaluation import plain_numpy
 from pipeline.evaluation.speed import checks, machine, memory, nufft, polar_bake, setting, transforms, work
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
 from pipeline.evaluation.speed.polar_bake import Stages
-from pipeline.evaluation.speed.processes import Compiling
+from pipeline.evaluation.speed.processes import CommandLine, Compiling, RunFailedError, warm_run_s
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of
 from pipeline.evaluation.speed.truth import MapTruth
@@ -211,6 +213,12 @@ def test_memory_is_that_of_a_process_of_its_own() -> None:
 def test_a_large_scan_has_a_bound(peak_bytes: int | None, verdict: str) -> None:
     check = checks.of_large_scan(peak_bytes)
     assert (check.id, check.verdict) == ("large_scan.speed.memory", verdict)
+
+
+def test_a_run_that_fails_says_why(tmp_path: Path) -> None:
+    failing = CommandLine((sys.executable, "-c", "import sys; sys.exit('out of luck')"))
+    with pytest.raises(RunFailedError, match="out of luck"):
+        warm_run_s(failing, tmp_path / "no.toml")
 
 
 def test_a_new_machine_has_bounds() -> None:
