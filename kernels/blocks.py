@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 # dft_stack: STEP of the first step's k1, with sums of two vectors, and KEPT frequencies of the second step, with two.
-# polar_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose window's loop along x is written out.
+# polar_power_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose loop along x is written out.
 # spectral_operator: W_BLOCK nodes of w with two vectors.
 _CHOSEN = {
     "STEP": 2,

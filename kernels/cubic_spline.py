@@ -6,8 +6,8 @@ Layouts as stated in opencl/cubic_spline.cl.
 import numpy as np
 
 from kernels import device, programs
-from kernels.diffraction import fourth_column
-from kernels.polar_spectrum import LANES
+from kernels.polar_power_spectrum import LANES
+from kernels.windowed_dft import fourth_column
 
 
 def coefficients(table: np.ndarray) -> np.ndarray:

@@ -29,13 +29,13 @@ def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Pr
         "ORDER": ORDER,
         "MOST_RINGS": MOST_RINGS,
     }
-    files = "dft_stack.cl", "polar_spectrum.cl", "spectral_operator.cl", "cubic_spline.cl"
+    files = "dft_stack.cl", "polar_power_spectrum.cl", "spectral_operator.cl", "cubic_spline.cl"
     return device.program(files, constants)
 
 
 def exact() -> device.Program:
     """The kernels of the exact reference, in double precision."""
-    return device.program(("dft_stack.cl", "power_spectrum.cl"), {**_stack("double", 8), "MOST_TAPS": MOST_TAPS})
+    return device.program(("dft_stack.cl", "exact_power.cl"), {**_stack("double", 8), "MOST_TAPS": MOST_TAPS})
 
 
 def _stack(real: str, lanes: int) -> dict[str, int | str]:

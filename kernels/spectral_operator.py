@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from kernels import device, programs
-from kernels.diffraction import fourth_column
-from kernels.polar_spectrum import LANES
+from kernels.chebyshev import chebyshev, w_max, w_nodes
+from kernels.polar_power_spectrum import LANES
 from kernels.programs import ORDER
+from kernels.windowed_dft import fourth_column
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def integrate(
     quadratures: RingQuadratures,
     reflectance: np.ndarray,
 ) -> np.ndarray:
-    """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from `polar_spectrum`'s E.
+    """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from E.
 
     `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,). `reflectance` (nodes of all rings'
     rules one after the other, w_terms) multiplies E at `group_w`; w_terms is a multiple of 4.
@@ -151,22 +152,3 @@ def _to_w_terms(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray
 def group_w(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
     """|w| of every ring where its group takes E, (rings, w_terms); beyond a ring's own w_max it goes on."""
     return np.outer(points.reach(rho), w_nodes(w_terms))
-
-
-def w_max(rho: np.ndarray) -> np.ndarray:
-    """The largest |w| of every ring."""
-    return np.sqrt(np.maximum(4.0 - rho**2, 0.0))
-
-
-def w_nodes(w_terms: int) -> np.ndarray:
-    """Where E is taken over |w|, as shares of w_max: Chebyshev's nodes on [0, 1]."""
-    return 0.5 * (chebyshev(w_terms)[1] + 1.0)
-
-
-def chebyshev(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The matrix from values at Chebyshev's nodes to coefficients of T_k, and the nodes in [-1, 1]."""
-    k = np.arange(count)
-    angle = np.pi * (k + 0.5) / count
-    matrix = np.cos(np.outer(k, angle)) * 2.0 / count
-    matrix[0] /= 2.0
-    return matrix, np.cos(angle)

@@ -249,7 +249,7 @@ static APART void write_terms(const float16 (*sum)[2], __global const float *w_s
 /* The table of one group of rings, at the sixteen azimuths of a tile and those half a turn on. One work-item, one group
  * and one tile of half a turn.
  *
- *   spectrum  float[2 * tiles][radii][s_nodes][16]   E, as polar_spectrum.cl writes it
+ *   spectrum  float[2 * tiles][radii][s_nodes][16]   E, as polar_power_spectrum.cl writes it
  *   w_series  float[rings][w_terms][w_terms]         Chebyshev coefficients over a ring's w from values at its group's
  *                                                    nodes, [term][w node]
  *   table     float[rings][3][w_terms][16 * 2 * tiles]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from kernels import polar_spectrum
-from kernels.spectral_operator import chebyshev
+from kernels import polar_power_spectrum
+from kernels.chebyshev import chebyshev
 from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.polar_grid import Azimuths
@@ -110,7 +110,7 @@ def chebyshev_stack(
 
     It fills whole vectors: they cost the same, and are shared with the device without a copy.
     """
-    filled = polar_spectrum.LANES * ceil(terms / polar_spectrum.LANES)
+    filled = polar_power_spectrum.LANES * ceil(terms / polar_power_spectrum.LANES)
     built = dft_stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
     return replace(built, terms=terms)
 
@@ -131,7 +131,7 @@ def gather(
     # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
     bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
-    return polar_spectrum.gather(upload(built), radius_per_um, half_turn, bessel)
+    return polar_power_spectrum.gather(upload(built), radius_per_um, half_turn, bessel)
 
 
 def build(

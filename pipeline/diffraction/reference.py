@@ -14,7 +14,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import diffraction
+from kernels import windowed_dft
 from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.upload import upload
@@ -111,7 +111,7 @@ class Reference:
     ) -> None:
         z = expansion.largest_phase(field.half_range_um, lambda_min_nm)
         # whole vectors of terms cost the same and are shared with the device without a copy
-        lanes = diffraction.LANES
+        lanes = windowed_dft.LANES
         terms = lanes * -(-(expansion.chebyshev_order(z, _TOLERANCE) + 1) // lanes)
         reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
         built = dft_stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
@@ -121,7 +121,7 @@ class Reference:
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
-        return np.asarray(diffraction.power_spectrum(self._stack, uvw, 1e-3 * lambda_nm))
+        return np.asarray(windowed_dft.exact_power(self._stack, uvw, 1e-3 * lambda_nm))
 
     def xyz(
         self,
@@ -135,7 +135,7 @@ class Reference:
         """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         quadrature = trapezoid(light, step_nm)
         uvw = geometry.uvw(wi, wr)
-        order, out = diffraction.line_order(uvw), np.empty((len(wr), 3))
+        order, out = windowed_dft.line_order(uvw), np.empty((len(wr), 3))
         for tile in _tiles(len(wr)):
             these = order[tile]
             power = self.power(uvw[these], quadrature.lambda_nm)

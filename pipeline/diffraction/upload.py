@@ -1,16 +1,16 @@
 """From a stack in memory to one on the device, faults told as this project tells them."""
 
-from kernels import device, diffraction
+from kernels import device, windowed_dft
 from pipeline.diffraction.device import require_device
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
 from pipeline.store import digest
 
 
-def upload(built: Stack) -> diffraction.DeviceStack:
+def upload(built: Stack) -> windowed_dft.DeviceStack:
     """The stack on the default device. Raises DeviceError where none works."""
     require_device()
-    return diffraction.upload_stack(
+    return windowed_dft.upload_stack(
         built.coefficients,
         (built.row_zero, built.column_zero),
         built.spacing_per_um,

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import comb
 
-from kernels import diffraction
+from kernels import windowed_dft
 from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Basis, Stack
@@ -75,7 +75,7 @@ class ChebyshevSeries:
         """XYZ (directions, 3) of the terms up to `order`."""
         config, rule = self.surface.config, trapezoid(self.surface.config.light, STEP_NM)
         terms = upload(_cut(self._stack, order))
-        power = diffraction.power_spectrum(terms, geometry.uvw(wi, wr), 1e-3 * rule.lambda_nm)
+        power = windowed_dft.exact_power(terms, geometry.uvw(wi, wr), 1e-3 * rule.lambda_nm)
         return integrate(power, rule, config.material, config.coherence.sigma_um, wi, wr)
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import ifft2
 
-from kernels import neighbourhood
+from kernels import thesis_lookup
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import expansion
@@ -122,7 +122,7 @@ class Lookup:
         built = transform(field, terms, (kept_x + 1 + taps_x, kept_y + 1 + taps_y))
         self.terms = terms
         self.stored_bytes = built.normalised.nbytes + built.least.nbytes + built.span.nbytes
-        self._device = neighbourhood.upload_terms(
+        self._device = thesis_lookup.upload_terms(
             built.normalised,
             built.least,
             built.span,
@@ -132,7 +132,7 @@ class Lookup:
             sigma_f(sigma_um),
         )
 
-    def at_pairs(self, weight: neighbourhood.Weight, uvw: Array, lambda_nm: Array) -> Array:
+    def at_pairs(self, weight: thesis_lookup.Weight, uvw: Array, lambda_nm: Array) -> Array:
         """Return |P|^2 (pairs,) of `uvw` (pairs, 3) at `lambda_nm` (pairs,); NaN beyond the Nyquist limits.
 
         Raises ValueError for wavelengths shorter than the config's.
@@ -146,10 +146,10 @@ class Lookup:
                 f"terms are kept up to {self._highest:.4g} / um: a wavelength is shorter than the config's"
             )
         power = np.full(len(uvw), np.nan)
-        power[known] = neighbourhood.power(self._device, weight, fx, fy, phase)
+        power[known] = thesis_lookup.power(self._device, weight, fx, fy, phase)
         return power
 
-    def power(self, weight: neighbourhood.Weight, uvw: Array, lambda_nm: Array) -> Array:
+    def power(self, weight: thesis_lookup.Weight, uvw: Array, lambda_nm: Array) -> Array:
         """Return |P|^2 (directions, L) of every direction (directions, 3) at every wavelength (L,), as `at_pairs`."""
         out = np.empty((len(uvw), len(lambda_nm)))
         for tile in tiles(len(uvw)):

@@ -11,7 +11,7 @@ from pipeline.progress import Progress, silent
 _KERNELS = {
     "STEP": ("along_x",),
     "KEPT": ("along_x", "along_y"),
-    "USUAL_TAPS": ("polar_spectrum",),
+    "USUAL_TAPS": ("polar_power_spectrum",),
     "W_BLOCK": ("apply_operator",),
 }
 

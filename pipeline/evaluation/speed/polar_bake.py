@@ -94,7 +94,7 @@ def stages(setting: Setting, baked: TimedBake) -> list[Timed]:
     spline_s = seconds["filter_azimuths"] + seconds["filter_rings"]
     return [
         Timed(work.stack(setting.field, baked.built), baked.stages.stack),
-        Timed(work.power_spectrum(setting, baked.built, baked.made), seconds["polar_spectrum"]),
+        Timed(work.power_spectrum(setting, baked.built, baked.made), seconds["polar_power_spectrum"]),
         Timed(work.build_operator(setting), seconds["build_operator"]),
         Timed(work.apply_operator(setting, baked.made, baked.table), seconds["apply_operator"]),
         Timed(work.splines(baked.table), spline_s),

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from kernels.spectral_operator import LinePoints, RingQuadratures, w_max, w_nodes
+from kernels.chebyshev import w_max, w_nodes
+from kernels.spectral_operator import LinePoints, RingQuadratures
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.special import jv
 
-from kernels.polar_spectrum import LANES
+from kernels.polar_power_spectrum import LANES
 from pipeline import layouts
 from pipeline.accuracy.exact import reference_evaluator
 from pipeline.arrays import Array

@@ -34,7 +34,7 @@ def layout_of(config: Config) -> PolarLayout:
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernel": kernel_digest("polar_spectrum.cl", *PLANNING_KERNELS),
+        "kernel": kernel_digest("polar_power_spectrum.cl", *PLANNING_KERNELS),
         "coherence": config.coherence.model_dump(mode="json"),
         "wavelengths": _wavelengths(config),
         "scene": None if config.scene is None else config.scene.model_dump(mode="json"),

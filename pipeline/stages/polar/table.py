@@ -24,7 +24,7 @@ _FILE = "table.zarr"
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernels": kernel_digest(*power_spectrum.PLANNING_KERNELS, "power_spectrum.cl"),
+        "kernels": kernel_digest(*power_spectrum.PLANNING_KERNELS, "exact_power.cl"),
         "spectrum": light_parameters(config),
         # the certificate is over colours, so all of the material counts
         "material": material_parameters(config),

@@ -14,8 +14,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.chebyshev import w_max
 from kernels.programs import MOST_RINGS, ORDER
-from kernels.spectral_operator import LinePoints, w_max
+from kernels.spectral_operator import LinePoints
 from pipeline.arrays import Array
 from pipeline.tables.polar.quadrature import RingQuadratures
 

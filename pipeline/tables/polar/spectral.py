@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.spectral_operator import chebyshev
+from kernels.chebyshev import chebyshev
 from pipeline.arrays import Array
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 

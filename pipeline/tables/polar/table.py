@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import cubic_spline
+from kernels.chebyshev import w_max
 from kernels.spectral_operator import RingQuadratures
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
@@ -22,7 +23,7 @@ from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.spectral_integral import Reflectance
 
 # at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
-_LEAST_W2 = 1e-9
+_LEAST_W_MAX = np.sqrt(1e-9)
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,7 @@ def build(
 
 def w_position(rho: Array, w: Array) -> Array:
     """x = 2 |w| / w_max - 1 in [-1, 1]."""
-    w_max = np.sqrt(np.maximum(4.0 - rho**2, _LEAST_W2))
-    return np.asarray(np.clip(2.0 * np.abs(w) / w_max - 1.0, -1.0, 1.0))
+    return np.asarray(np.clip(2.0 * np.abs(w) / np.maximum(w_max(rho), _LEAST_W_MAX) - 1.0, -1.0, 1.0))
 
 
 def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quadrature) -> float:

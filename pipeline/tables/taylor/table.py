@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import diffraction
+from kernels import windowed_dft
 from pipeline.arrays import Array
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.upload import upload
@@ -115,7 +115,7 @@ def node_values(stack: Stack, quadrature: Quadrature, uv: Array) -> Array:
 
 
 def _tiles(stack: Stack, quadrature: Quadrature, uv: Array) -> Iterator[tuple[slice, Array]]:
-    return diffraction.taylor_table(upload(stack), uv, 1e-3 * quadrature.lambda_nm, quadrature.weights)
+    return windowed_dft.taylor_table(upload(stack), uv, 1e-3 * quadrature.lambda_nm, quadrature.weights)
 
 
 def sum_powers(i_p: Array, w: Array) -> Array:

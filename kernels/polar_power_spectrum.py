@@ -1,9 +1,9 @@
-"""Host side of the polar power spectrum's kernel. Layouts as stated in opencl/polar_spectrum.cl."""
+"""Host side of the polar power spectrum's kernel. Layouts as stated in opencl/polar_power_spectrum.cl."""
 
 import numpy as np
 
 from kernels import device, programs
-from kernels.diffraction import DeviceStack
+from kernels.windowed_dft import DeviceStack
 
 LANES = 16  # azimuths of a tile: floats in one vector
 
@@ -26,7 +26,7 @@ def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarra
     out = device.empty((2 * len(tiles), len(radius_per_um), nodes, LANES), np.float32)
     result = device.shared(out)
     program.launch(
-        "polar_spectrum",
+        "polar_power_spectrum",
         (len(radius_per_um), len(tiles)),
         stack.buffer,
         stack.decay,

@@ -1,4 +1,4 @@
-"""Host side of neighbourhood.cl: |P|^2 from the min/max-normalised DFT terms of [S14]; layouts as stated there."""
+"""Host side of thesis_lookup.cl: |P|^2 from the min/max-normalised DFT terms of [S14]; layouts as stated there."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -65,7 +65,7 @@ def power(terms: DeviceTerms, weight: Weight, fx: np.ndarray, fy: np.ndarray, ph
     Every neighbourhood must lie within the terms uploaded.
     """
     constants = {"BLOCKS": terms.blocks, "MOST_TAPS": device.bound(2 * max(terms.reach) + 1, _TAPS_BOUND)}
-    program = device.program(("neighbourhood.cl",), constants)
+    program = device.program(("thesis_lookup.cl",), constants)
     reach = [np.int32(n) for n in terms.reach]
     out = np.empty(len(phase))
     pairs = np.zeros((min(_TILE, len(phase)), 4))

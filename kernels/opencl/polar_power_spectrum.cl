@@ -172,7 +172,7 @@ static APART void power_at_node(const float16 *re, const float16 *im, const int1
     STORE(select(minus, plus, turned), opposite);
 }
 
-__kernel void polar_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
+__kernel void polar_power_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
                              __global const double *radius, const int radii, __global const double *azimuth,
                              __global const float *series, const int terms, const int blocks, const int s_nodes,
                              const int reach_x, const int reach_y, const double fx_max, const double fy_max,

@@ -106,7 +106,7 @@ def taylor_table(
 
 
 def line_order(uvw: np.ndarray) -> np.ndarray:
-    """Indices (directions,) that sort directions into lines of one v, u ascending, for `power_spectrum`.
+    """Indices (directions,) that sort directions into lines of one v, u ascending, for `exact_power`.
 
     `uvw` (directions, 3). Those with u < 0 stand where (-u, -v) does, from whose frequency they are served.
     """
@@ -122,7 +122,7 @@ def _turn(uvw: np.ndarray) -> np.ndarray:
 def _lines(uvw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions `uvw` (directions, 3) in lines: where each begins, the directions in order, where each came from.
 
-    As power_spectrum.cl's `first`, `directions` and `place`.
+    As exact_power.cl's `first`, `directions` and `place`.
     """
     order, turn = line_order(uvw), _turn(uvw)[:, None]
     directions = np.concatenate([turn * uvw[:, :2], uvw[:, 2:], turn], axis=1)[order]
@@ -130,7 +130,7 @@ def _lines(uvw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.append(begins, len(uvw)).astype(np.int32), directions, order.astype(np.int32)
 
 
-def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:
+def exact_power(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:
     """|P|^2 (directions, L) from a Chebyshev stack; NaN beyond the scan's band.
 
     `uvw` (directions, 3), `lambda_um` (L,). Directions of equal v are cheaper together than apart: a map's rows, five
@@ -146,7 +146,7 @@ def power_spectrum(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -
     out = device.empty((len(uvw), groups * _WAVELENGTHS), np.float64)
     result = device.shared(out)
     program.launch(
-        "power_spectrum",
+        "exact_power",
         (items,),
         stack.buffer,
         stack.decay,

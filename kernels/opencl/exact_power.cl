@@ -196,7 +196,7 @@ static APART void line_power(__global const double *stack, __global const double
     }
 }
 
-__kernel void power_spectrum(__global const double *stack, __global const double *decay, const Grid grid,
+__kernel void exact_power(__global const double *stack, __global const double *decay, const Grid grid,
                              const int blocks, const int reach_x, const int reach_y, const int lines, const int groups,
                              __global const int *first, __global const double4 *directions, __global const int *place,
                              __global const double *lambda, const double half_range, const double fx_max,
