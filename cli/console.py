@@ -120,10 +120,10 @@ def step_reporter(config: Any, store: Any) -> Callable[[Any, float | None], None
 @contextmanager
 def showing_progress() -> Iterator[Progress]:
     """Yields a progress callback: a bar on a terminal, else a line per long step. It reports compilation, too."""
-    from kernels.device import announcing_compilation
+    from kernels.cache import kernel_cache
 
     # functools' cache prints the line once, even if many kernels are compiled
-    with announcing_compilation(cache(lambda: note("  compiling kernels for this processor, once ..."))):
+    with kernel_cache().announcing(cache(lambda: note("  compiling kernels for this processor, once ..."))):
         # stderr is None where the process has none (2>&-)
         if sys.stderr is not None and sys.stderr.isatty():
             with _bar() as progress:

@@ -24,21 +24,24 @@ OTHERS = {
     "USUAL_TAPS": 0,
     "W_BLOCK": 4,
 }
-_instead: dict[str, int] = {}
 
 
-def chosen(*names: str) -> dict[str, int]:
-    """The values of some constants, by their names in the kernels."""
-    return {name: (_CHOSEN | _instead)[name] for name in names}
+class Blocks:
+    """The values of these constants on one device."""
 
+    def __init__(self) -> None:
+        self._values = dict(_CHOSEN)
 
-@contextmanager
-def instead(**constants: int) -> Iterator[None]:
-    """Other values for a while, to time them."""
-    before = dict(_instead)
-    _instead.update(constants)
-    try:
-        yield
-    finally:
-        _instead.clear()
-        _instead.update(before)
+    def chosen(self, *names: str) -> dict[str, int]:
+        """Return the values of some constants, by their names in the kernels."""
+        return {name: self._values[name] for name in names}
+
+    @contextmanager
+    def instead(self, **constants: int) -> Iterator[None]:
+        """Take other values while this lasts, to time them."""
+        before = self._values
+        self._values = before | constants
+        try:
+            yield
+        finally:
+            self._values = before

@@ -4,26 +4,22 @@ A device counts as working only when a kernel was built and run on it: drivers e
 cannot compile for it. Contexts do not survive a fork, so they are made lazily, once per process.
 """
 
-import hashlib
 import os
-import tempfile
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import platformdirs
-from filelock import FileLock
+
+from kernels import source
+from kernels.blocks import Blocks
+from kernels.cache import kernel_cache
+from kernels.memory import LINE, MemoryPool
 
 DEVICE_VARIABLE = "DIFFRACT_BAKE_DEVICE"
-_LINE = 64  # bytes of a cache line, and of a vector
-_MOST_SPARE_BYTES = 2**28
 _POCL = "Portable Computing Language"  # PoCL's name of its platform
 _INSTALL = (
     "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
@@ -32,9 +28,6 @@ _INSTALL = (
 
 # -w: without AVX-512, PoCL's compiler warns of every vector argument that its ABI differs; errors still come through
 _OPTIONS = ["-cl-mad-enable", "-w"]
-
-# of each of three arrays: more than last caches hold
-_TRIAD_BYTES = 2**27
 
 # doubles, and the floats of a vector register that the compiler builds for: PoCL states the processor's own even
 # where it builds for another one (POCL_LLVM_CPU_NAME)
@@ -76,54 +69,9 @@ class Probe:
 
 
 @cache
-def cache_folder() -> Path:
-    """Where compiled kernels are kept between processes; for this process alone where that cannot be written."""
-    folder = Path(platformdirs.user_cache_dir("diffract-bake")) / "kernels"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with FileLock(folder / "lock"):
-            pass
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="diffract-bake-kernels-"))
-    return folder
-
-
-_listeners: list[Callable[[], None]] = []
-
-
-@contextmanager
-def announcing_compilation(announce: Callable[[], None]) -> Iterator[None]:
-    """Calls `announce` before each program or kernel that this machine has not compiled yet, while it lasts."""
-    _listeners.append(announce)
-    try:
-        yield
-    finally:
-        _listeners.remove(announce)
-
-
-@contextmanager
-def _compiling(identity: str) -> Iterator[None]:
-    """Holds the kernel cache alone: PoCL's cache fails at random when processes fill it together.
-
-    identity: of the program or kernel. A mark beside the cache remembers that it was compiled.
-    """
-    mark = cache_folder() / "compiled" / hashlib.sha256(identity.encode()).hexdigest()
-    with FileLock(cache_folder() / "lock"):
-        if mark.exists():
-            yield
-            return
-        for announce in _listeners:
-            announce()
-        yield
-        with suppress(OSError):  # without its mark, the next process announces it once more
-            mark.parent.mkdir(exist_ok=True)
-            mark.touch()
-
-
-@cache
 def _opencl() -> Any:
     """pyopencl, imported once its compilers' caches have a place."""
-    os.environ.setdefault("POCL_CACHE_DIR", str(cache_folder()))
+    os.environ.setdefault("POCL_CACHE_DIR", str(kernel_cache().folder))
     # PoCL has its own cache on disk; pyopencl's second one only adds files
     os.environ.setdefault("PYOPENCL_NO_CACHE", "1")
     import pyopencl
@@ -152,7 +100,7 @@ def _probe(platform: Any, device: Any) -> Probe:
     fault, out, context = "", np.zeros(4), None
     try:
         context = cl.Context([device])
-        with _compiling(f"{driver} {name} {_PROBE}"):
+        with kernel_cache().compiling(f"{driver} {name} {_PROBE}"):
             queue = cl.CommandQueue(context)
             buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, out.nbytes)
             cl.Program(context, _PROBE).build(_OPTIONS).probe(queue, (4,), None, buffer)
@@ -167,11 +115,20 @@ def _probe(platform: Any, device: Any) -> Probe:
 
 
 @dataclass(frozen=True)
+class Launch:
+    """One kernel that ran, and how long it took from its launch to its end."""
+
+    kernel: str
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Device:
-    """The device in use, its context and its in-order queue.
+    """The device in use, its context and its in-order queue, with what belongs to it.
 
     vector_width: floats of a vector register that its compiler builds for.
     shares_memory: whether its memory is the process's.
+    memory: of arrays that its kernels read and write. blocks: constants that its kernels are compiled with.
     """
 
     name: str
@@ -181,6 +138,27 @@ class Device:
     shares_memory: bool
     context: Any
     queue: Any
+    memory: MemoryPool = field(default_factory=MemoryPool)
+    blocks: Blocks = field(default_factory=Blocks)
+    _timings: list[list[Launch]] = field(default_factory=list)
+
+    @contextmanager
+    def timing(self) -> Iterator[list[Launch]]:
+        """Fill a list with every launch on this device while this lasts."""
+        launches: list[Launch] = []
+        self._timings.append(launches)
+        try:
+            yield launches
+        finally:
+            self._timings.pop()
+
+    def run(self, kernel: Any, size: tuple[int, ...], arguments: tuple[Any, ...]) -> None:
+        """Run one kernel over `size` work-items and wait for it."""
+        started = time.perf_counter()
+        kernel(self.queue, size, (1,) * len(size), *arguments)
+        self.queue.finish()
+        for launches in self._timings:
+            launches.append(Launch(kernel.function_name, time.perf_counter() - started))
 
 
 @cache
@@ -243,62 +221,28 @@ def _programs(sources: tuple[str, ...], constants: tuple[tuple[str, int | str], 
     return Program(sources, dict(constants))
 
 
-@dataclass(frozen=True)
-class Launch:
-    """One kernel that ran, and how long it took from its launch to its end."""
-
-    kernel: str
-    seconds: float
-
-
-_listening: list[list[Launch]] = []
-
-
-@contextmanager
-def timing() -> Iterator[list[Launch]]:
-    """Fills a list with every launch of this process while it lasts."""
-    launches: list[Launch] = []
-    _listening.append(launches)
-    try:
-        yield launches
-    finally:
-        _listening.pop()
-
-
 class Program:
     """OpenCL sources built with constants, their kernels ready to launch on the default device."""
 
     def __init__(self, sources: Sequence[str], constants: Mapping[str, int | str]) -> None:
         cl = _opencl()
         self.device = default_device()
-        text = "\n".join(source(name) for name in sources)
+        text = source.text(*sources)
         options = [*_OPTIONS, *(f"-D{key}={value}" for key, value in sorted(constants.items()))]
         self._identity = f"{self.device.driver} {self.device.name} {self.device.vector_width} {options} {text}"
-        with _compiling(self._identity):
+        with kernel_cache().compiling(self._identity):
             self._program = cl.Program(self.device.context, text).build(options)
         self._kernels: dict[str, Any] = {}
 
     def launch(self, kernel: str, size: tuple[int, ...], *arguments: Any) -> None:
-        """Runs one kernel over `size` work-items and waits, so that buffers may go afterwards."""
-        if kernel not in self._kernels:
-            self._kernels[kernel] = getattr(self._program, kernel)
-            # PoCL finishes compiling at the first launch
-            with _compiling(f"{kernel} {self._identity}"):
-                self._enqueue(kernel, size, arguments)
+        """Run one kernel over `size` work-items and wait, so that buffers may go afterwards."""
+        if kernel in self._kernels:
+            self.device.run(self._kernels[kernel], size, arguments)
             return
-        self._enqueue(kernel, size, arguments)
-
-    def _enqueue(self, kernel: str, size: tuple[int, ...], arguments: tuple[Any, ...]) -> None:
-        started = time.perf_counter()
-        self._kernels[kernel](self.device.queue, size, (1,) * len(size), *arguments)
-        self.device.queue.finish()
-        for launches in _listening:
-            launches.append(Launch(kernel, time.perf_counter() - started))
-
-
-def source(name: str) -> str:
-    """The text of one kernel file."""
-    return files("kernels").joinpath("opencl", name).read_text(encoding="utf-8")
+        self._kernels[kernel] = getattr(self._program, kernel)
+        # PoCL finishes compiling at the first launch
+        with kernel_cache().compiling(f"{kernel} {self._identity}"):
+            self.device.run(self._kernels[kernel], size, arguments)
 
 
 def upload(array: np.ndarray) -> Any:
@@ -323,37 +267,8 @@ def download(buffer: Any, out: np.ndarray) -> np.ndarray:
 
 
 def empty(shape: tuple[int, ...], dtype: Any) -> np.ndarray:
-    """An array that begins on a cache line: elsewhere every vector that a kernel loads would touch two.
-
-    Its memory may have served before: pages that were never touched cost a kernel as much as its work.
-    """
-    bytes_ = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-    raw = np.asarray(_Pages(bytes_ + _LINE))
-    first = -raw.ctypes.data % _LINE
-    array: np.ndarray = raw[first : first + bytes_].view(dtype).reshape(shape)
-    return array
-
-
-_spare: list[np.ndarray] = []
-# collecting garbage may free pages while pages are being taken
-_spare_lock = threading.RLock()
-
-
-class _Pages:
-    """Memory behind arrays, which outlives them: the next array takes it over."""
-
-    def __init__(self, bytes_: int) -> None:
-        with _spare_lock:
-            fitting = (i for i, spare in enumerate(_spare) if bytes_ <= spare.nbytes <= 2 * bytes_)
-            i = next(fitting, None)
-            self._memory = np.empty(bytes_, np.uint8) if i is None else _spare.pop(i)
-        self.__array_interface__ = {**self._memory.__array_interface__, "shape": (bytes_,)}
-
-    def __del__(self) -> None:
-        with _spare_lock:
-            _spare.append(self._memory)
-            while sum(spare.nbytes for spare in _spare) > _MOST_SPARE_BYTES:
-                _spare.pop(0)
+    """An array on the device's memory pool, which begins on a cache line."""
+    return default_device().memory.empty(shape, dtype)
 
 
 def shared(array: np.ndarray) -> Any:
@@ -364,7 +279,7 @@ def shared(array: np.ndarray) -> Any:
 
 def lent(array: np.ndarray) -> Any:
     """A device buffer to read from: the array's own memory if it is one block from a cache line on, else a copy."""
-    return shared(array) if array.flags.c_contiguous and array.ctypes.data % _LINE == 0 else upload(array)
+    return shared(array) if array.flags.c_contiguous and array.ctypes.data % LINE == 0 else upload(array)
 
 
 def settle(buffer: Any, array: np.ndarray) -> np.ndarray:
@@ -375,36 +290,3 @@ def settle(buffer: Any, array: np.ndarray) -> np.ndarray:
     )
     mapped.base.release()
     return array
-
-
-def measure_peak(precision: Literal["single", "double"], seconds: float = 0.5) -> float:
-    """Operations a second of this device, by chains of fused multiply-adds on whole vectors of 64 bytes."""
-    lanes, size = {"single": (16, 4), "double": (8, 8)}[precision]
-    peak = program(("peak.cl",), {"LANES": lanes})
-    items, steps = 64 * default_device().compute_units, 20_000
-    buffer = result_buffer(size * items)
-    return items * steps * 16.0 * lanes / _shortest(peak, "peak", (items,), (np.int32(steps), buffer), seconds)
-
-
-def measure_bandwidth(seconds: float = 0.5) -> float:
-    """Bytes a second between this device and its memory, by McCalpin's triad: two arrays read, one written."""
-    vectors, nbytes = 256, _TRIAD_BYTES
-    ones = np.ones(nbytes // 4, np.float32)
-    a, b, out = upload(ones), upload(ones), result_buffer(nbytes)
-    triad = program(("bandwidth.cl",), {"VECTORS": vectors})
-    items = nbytes // (64 * vectors)
-    return 3.0 * nbytes / _shortest(triad, "triad", (items,), (a, b, np.float32(3.0), out), seconds)
-
-
-def _shortest(
-    built: Program, kernel: str, size: tuple[int, ...], arguments: tuple[Any, ...], seconds: float
-) -> float:
-    """The shortest of all launches that fit into `seconds`, s."""
-    # the first compiles, and touches every page
-    built.launch(kernel, size, *arguments)
-    best, until = float("inf"), time.perf_counter() + seconds
-    while time.perf_counter() < until:
-        with timing() as launches:
-            built.launch(kernel, size, *arguments)
-        best = min(best, launches[0].seconds)
-    return best

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import blocks, device, programs
+from kernels import device, programs
 
 _VECTOR_BYTES = 64
 _ITEMS_A_UNIT = 4  # work-items, each with scratch that stays in a core's cache
@@ -44,7 +44,7 @@ def transform(
     ny, nx = heights_um.shape
     lanes, terms = _VECTOR_BYTES // out.dtype.itemsize, out.shape[3]
     columns, rows = max(kept.phi_max, kept.reach) + 1, kept.shape[0]
-    sizes = blocks.chosen("STEP", "KEPT")
+    sizes = device.default_device().blocks.chosen("STEP", "KEPT")
     x = _axis(nx, np.arange(columns), sizes["STEP"], sizes["KEPT"], out.dtype)
     y = _axis(ny, np.arange(-kept.psi_max, kept.psi_max + 1), 1, sizes["KEPT"], out.dtype)
     program = programs.polar() if out.dtype == np.float32 else programs.exact()

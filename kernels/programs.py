@@ -1,6 +1,6 @@
 """Which kernels are built together: a build costs the compiler a tenth of a second, whatever is in it."""
 
-from kernels import blocks, device
+from kernels import device
 
 # Bounds of what a work-item keeps, wide enough for surfaces 10 um tall; what is taller takes a program of its own.
 _MOST_BLOCKS = 16  # of 16 Chebyshev terms
@@ -10,6 +10,7 @@ _MOST_W_TERMS = 136  # a config may ask for 128, and planning looks a few furthe
 MOST_TAPS = 49
 
 MOST_PAIRS = 128  # of samples and their mirror images in the first step of a transform: n1 / 2 + 1 of n = n1 n2
+CHANNELS = 3  # X, Y and Z
 ORDER = 8  # nodes of every interpolation of the spectral operator, over r and along kappa
 MOST_RINGS = 8  # of a group of rings, whose sums stay in the nearest cache
 
@@ -21,7 +22,7 @@ def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Pr
     """
     constants = {
         **_stack("float", 16),
-        **blocks.chosen("USUAL_TAPS", "W_BLOCK"),
+        **device.default_device().blocks.chosen("USUAL_TAPS", "W_BLOCK"),
         "MOST_BLOCKS": device.bound(term_blocks, _MOST_BLOCKS),
         "MOST_S_NODES": device.bound(s_nodes, _MOST_S_NODES),
         "MOST_W_TERMS": device.bound(w_terms, _MOST_W_TERMS),
@@ -40,4 +41,5 @@ def exact() -> device.Program:
 
 def _stack(real: str, lanes: int) -> dict[str, int | str]:
     """Constants of dft_stack.cl, whose vectors of `lanes` numbers have 64 bytes."""
-    return {"REAL": real, "LANES": lanes, "MOST_PAIRS": MOST_PAIRS, **blocks.chosen("STEP", "KEPT")}
+    sizes = device.default_device().blocks.chosen("STEP", "KEPT")
+    return {"REAL": real, "LANES": lanes, "MOST_PAIRS": MOST_PAIRS, **sizes}

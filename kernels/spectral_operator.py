@@ -8,7 +8,7 @@ import numpy as np
 from kernels import device, programs
 from kernels.chebyshev import chebyshev, w_max, w_nodes
 from kernels.polar_power_spectrum import LANES
-from kernels.programs import ORDER
+from kernels.programs import CHANNELS, ORDER
 from kernels.windowed_dft import fourth_column
 
 
@@ -83,7 +83,7 @@ def integrate(
     w_terms, rings = reflectance.shape[1], len(rho)
     program, operator = _operator(radius_per_um, s_nodes, s_max_per_um, rho, points, quadratures, reflectance)
     to_w_terms = device.upload(_to_w_terms(rho, points, w_terms).astype(np.float32))
-    out = device.empty((rings, 3 * w_terms, LANES * tiles), np.float32)
+    out = device.empty((rings, CHANNELS * w_terms, LANES * tiles), np.float32)
     power, result = device.lent(spectrum), device.shared(out)
     size, sizes = (len(points.rings), tiles // 2), (np.int32(s_nodes), np.int32(w_terms))
     program.launch("apply_operator", size, power, np.int32(radii), *operator, *sizes, to_w_terms, result)
@@ -117,24 +117,25 @@ def _operator(
             w_nodes(w_terms).astype(np.float32),
         )
     ]
-    count, shares = len(points.place), int(points.rings @ points.count)
-    floats = count * ORDER, count * s_nodes * w_terms, shares * 3 * w_terms, 2 * len(rho)
-    weights = [device.result_buffer(4 * n) for n in floats]
+    count, ring_points = len(points.place), int(points.rings @ points.count)
+    # lagrange_r, cardinal_s and point_weights in float; used, two int of each ring
+    numbers = count * ORDER, count * s_nodes * w_terms, ring_points * CHANNELS * w_terms, 2 * len(rho)
+    weights = [device.result_buffer(4 * n) for n in numbers]
     sizes = np.float32(s_max_per_um), np.int32(s_nodes), np.int32(w_terms)
     program.launch("build_operator", (len(points.rings),), *where, *inputs, *sizes, *weights)
     return program, [*where, *weights]
 
 
 def _groups(points: LinePoints) -> np.ndarray:
-    """The kernels' Group of every group, (groups, 6)."""
+    """The kernels' Group of every group, int (groups, 6)."""
     where = points.first, points.count, points.on_radii, points.on_nodes, points.first_ring, points.rings
     return np.stack(where, axis=-1)
 
 
 def _rings(points: LinePoints, quadratures: RingQuadratures) -> np.ndarray:
-    """The kernels' Ring of every ring, (rings, 4)."""
-    shares, count = points.count[points.group], quadratures.count
-    where = np.cumsum(shares) - shares, quadratures.first, count, np.cumsum(count) - count
+    """The kernels' Ring of every ring, int (rings, 4)."""
+    weights, count = points.count[points.group], quadratures.count
+    where = np.cumsum(weights) - weights, quadratures.first, count, np.cumsum(count) - count
     return np.stack(where, axis=-1)
 
 

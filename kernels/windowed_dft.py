@@ -81,7 +81,7 @@ def taylor_table(
     """
     powers, width = 2 * stack.terms - 1, 2 * LANES * stack.blocks
     constants = {"BLOCKS": stack.blocks, "MOST_TAPS": programs.MOST_TAPS}
-    program = device.program(("windowed_dft.cl", "taylor_table.cl"), constants)
+    program = device.program(("taylor_table.cl",), constants)
     series = _taylor_series(lambda_um, stack)
     nodes, *spectrum = (device.upload(a) for a in (uv, lambda_um, series, fourth_column(weights)))
     tile = np.empty((_TILE, 3, width))
@@ -141,7 +141,7 @@ def exact_power(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> n
     lines, groups = len(first) - 1, -(-len(lambda_um) // _WAVELENGTHS)
     padded = np.pad(lambda_um, (0, groups * _WAVELENGTHS - len(lambda_um)), mode="edge")
     items = min(lines * groups, _ITEMS_A_UNIT * device.default_device().compute_units)
-    scratch = 16 * stack.blocks * (_WAVELENGTHS * (2 * stack.reach[0] + 1) + 12)
+    scratch = _WAVELENGTHS * (2 * stack.reach[0] + 1 + 3) * 2 * LANES * stack.blocks
     read = [device.upload(a) for a in (first, directions, place, padded)]
     out = device.empty((len(uvw), groups * _WAVELENGTHS), np.float64)
     result = device.shared(out)

@@ -1,26 +1,46 @@
 /* Cubic B-splines through the samples of a polar table, and their look-up.
  *
- * Coefficients come from samples by the filter sqrt(3) z^|k|, z = sqrt(3) - 2 (Unser 1993), once along each axis;
- * the spline through (..., c_(i-1), c_i, c_(i+1), c_(i+2), ...) has the four weights of `spline`. Between samples that is half
- * the error of Catmull-Rom, and its weights are positive: four bilinear fetches make one bicubic.
+ * Coefficients come from samples by the filter sqrt(3) z^|k|, z = sqrt(3) - 2 (Unser 1993), once along each axis; the
+ * spline through (..., c_(i-1), c_i, c_(i+1), c_(i+2), ...) has the four weights of `spline`. Between samples that is
+ * half the error of Catmull-Rom, and its weights are positive: four bilinear fetches make one bicubic.
  *
- *   table   float[rings][3 w_terms][azimuths]   outputs of the spectral operator; azimuths is a multiple of 32
+ * Rings go on below the first, which is one point, as the opposite half turn: (-i, a) = (i, a + azimuths / 2);
+ * beyond the last they are mirrored. Azimuths are periodic.
  *
- * Rings go on below the first, which is one point, as the opposite half turn: (-i, a) = (i, a + azimuths / 2); beyond the
- * last they are mirrored. Azimuths are periodic.
+ * filter_azimuths: coefficients around the turn, in place; one work-item, one output and ring. filter_rings: across the
+ * rings, in place; one work-item, LANES azimuths of half a turn and those opposite, one output. look_up: values between
+ * samples; one work-item, one direction. Arguments:
+ *
+ * filter_azimuths
+ *   table     float[rings][outputs][azimuths]   1   samples, then coefficients; azimuths is a multiple of 2 LANES
+ *   azimuths  int                               1   of a ring
+ *
+ * filter_rings
+ *   table     float[rings][outputs][azimuths]   1   coefficients around the turn, then of both axes
+ *   rings     int                               1   of the table
+ *
+ * look_up
+ *   table     float[rings][CHANNELS][w_terms][azimuths]   1   coefficients
+ *   rings     int                               1   of the table
+ *   azimuths  int                               1   of a ring
+ *   w_terms   int                               1   Chebyshev terms in |w|
+ *   cell      int2[directions]                  1   the ring and the azimuth below a direction
+ *   place     float4[directions]                1   the fractions beyond them; 2 |w| / w_max - 1; fourth unused
+ *   value     float4[directions]                1   result: X, Y, Z = sum_k T_k table[k]; fourth unused
+ *
+ * Set by the host: LANES, 16.
  */
 
-#define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
-/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
-#define APART __attribute__((noinline))
-#define Z (-0.26794919f)
+#include "common.cl"
+#define Z (-0.26794919f)  /* the filter's pole, sqrt(3) - 2 */
 #define Z2 (Z * Z)
 #define Z4 (Z2 * Z2)
 #define Z8 (Z4 * Z4)
 #define BLOCK 16  /* vectors of a row that wait in the nearest cache */
 #define RINGS 32  /* of a column that wait there */
-#define AHEAD 16
+#define AHEAD 16  /* steps after which a recursion has forgotten where it began: z^16 = 7e-10 */
+#define GAIN 6.0f /* both recursions make -z / (1 - z^2) z^|k|, and 6 of it are sqrt(3) z^|k| */
+#define TAPS 4    /* of a cubic spline, along each axis */
 
 /* One factor of sum_k z^|k| d^k, d a step along the row. That sum is 1 - z^2 times the product over n = 1, 2, 4, ... of
  * (1 + z^n d^n) (1 + z^n d^-n) = (1 + z^2n) (1 + q (d^n + d^-n)), q = z^n / (1 + z^2n); what n = 16 adds is 7e-10. */
@@ -35,16 +55,16 @@
             x = b;                                                                                                     \
         }                                                                                                              \
     }
-FACTOR(factor_1, (float16)(a.sf, x.s01234567, x.s89ab, x.scd, x.se), (float16)(x.s1, x.s23, x.s4567, x.s89abcdef, b.s0), Z)
+FACTOR(factor_1, (float16)(a.sf, x.s01234567, x.s89ab, x.scd, x.se),
+       (float16)(x.s1, x.s23, x.s4567, x.s89abcdef, b.s0), Z)
 FACTOR(factor_2, (float16)(a.sef, x.s01234567, x.s89ab, x.scd), (float16)(x.s23, x.s4567, x.s89abcdef, b.s01), Z2)
 FACTOR(factor_4, (float16)(a.scdef, x.s01234567, x.s89ab), (float16)(x.s4567, x.s89abcdef, b.s0123), Z4)
 FACTOR(factor_8, (float16)(a.hi, x.lo), (float16)(x.hi, b.lo), Z8)
 
-/* Around the turn, in place. One work-item, one ring and output: a row, BLOCK vectors at a time with one on either side,
- * where 15 lanes suffice. */
+/* A row, BLOCK vectors at a time with one on either side, whose 15 nearest lanes suffice. */
 __kernel void filter_azimuths(__global float *table, const int azimuths) {
     __global float *row = table + (long)(get_global_id(1) * get_global_size(0) + get_global_id(0)) * azimuths;
-    const int vectors = azimuths / 16;
+    const int vectors = azimuths / LANES;
     const float gain = sqrt(3.0f) * (1.0f - Z2) * (1.0f + Z2) * (1.0f + Z4) * (1.0f + Z8) * (1.0f + Z8 * Z8);
     const float16 first = vload16(0, row);
     float16 before = vload16(vectors - 1, row), line[BLOCK + 2];
@@ -62,19 +82,20 @@ __kernel void filter_azimuths(__global float *table, const int azimuths) {
     }
 }
 
-/* a ring beyond either end: its place in the table, and whether it is half a turn on */
+/* A ring beyond either end: its place in the table, and whether it is half a turn on. */
 static int ring_of(int ring, const int rings, int *opposite) {
     *opposite = ring < 0;
     ring = abs(ring);
     return clamp(ring < rings ? ring : 2 * (rings - 1) - ring, 0, rings - 1);
 }
 
-/* Across the rings, in place: a recursion outwards and one back, over RINGS at a time, whose way back begins AHEAD of
- * them. One work-item, one output, sixteen azimuths of half a turn and those opposite: their rings below the first. */
+/* A recursion outwards and one back, over RINGS at a time; the one back begins AHEAD of them. */
 __kernel void filter_rings(__global float *table, const int rings) {
-    const int tile = get_global_id(0), tiles = get_global_size(0), output = get_global_id(1), outputs = get_global_size(1);
-    const long ring = 2 * (long)outputs * tiles;
-    __global float *here = table + (2 * output * tiles + tile) * 16, *there = here + tiles * 16;
+    const int tile = get_global_id(0), tiles = get_global_size(0);
+    const int output = get_global_id(1), outputs = get_global_size(1);
+    /* vectors from ring to ring */
+    const long ring = (long)HALVES * outputs * tiles;
+    __global float *here = table + (HALVES * output * tiles + tile) * LANES, *there = here + tiles * LANES;
 
     float16 a = 0.0f, b = 0.0f;
     ROLLED for (int i = -AHEAD; i < 0; ++i) {
@@ -85,7 +106,7 @@ __kernel void filter_rings(__global float *table, const int rings) {
     }
     ROLLED for (int from = 0; from < rings; from += RINGS) {
         const int count = min(RINGS, rings - from), seen = min(RINGS + AHEAD, rings - from);
-        float16 out[RINGS + AHEAD + 1][2];
+        float16 out[RINGS + AHEAD + 1][HALVES];
         out[0][0] = a;
         out[0][1] = b;
         ROLLED for (int i = 0; i < seen; ++i) {
@@ -102,8 +123,8 @@ __kernel void filter_rings(__global float *table, const int rings) {
             a_back = Z * (a_back - out[i + 1][0]);
             b_back = Z * (b_back - out[i + 1][1]);
             if (i < count) {
-                vstore16(6.0f * a_back, ring * (from + i), here);
-                vstore16(6.0f * b_back, ring * (from + i), there);
+                vstore16(GAIN * a_back, ring * (from + i), here);
+                vstore16(GAIN * b_back, ring * (from + i), there);
             }
         }
         a = out[count][0];
@@ -111,44 +132,37 @@ __kernel void filter_rings(__global float *table, const int rings) {
     }
 }
 
+/* Weights of the four samples about a place, t beyond the second. */
 static float4 spline(const float t) {
     const float u = 1.0f - t;
     return (float4)(u * u * u, 4.0f - 3.0f * t * t * (2.0f - t), 4.0f - 3.0f * u * u * (2.0f - u), t * t * t) / 6.0f;
 }
 
-/* A table's value between samples: sixteen of them, by their places in one output, and their weights */
+/* A table's value between samples: those about it, by their places in one output, and their weights. */
 static float between(__global const float *output, const long *place, const float *weight) {
     float sum = 0.0f;
-    UNROLL for (int tap = 0; tap < 16; ++tap) sum = fma(weight[tap], output[place[tap]], sum);
+    UNROLL for (int tap = 0; tap < TAPS * TAPS; ++tap) sum = fma(weight[tap], output[place[tap]], sum);
     return sum;
 }
 
-/* Values at places between the samples.
- *
- *   cell    int2[directions]        the ring and the azimuth below a place
- *   place   float4[directions]      the fractions beyond them; 2 |w| / w_max - 1; fourth unused
- *   value   float4[directions]      X, Y, Z: sum_k T_k table[k]; fourth unused
- *
- * One work-item, one direction.
- */
 __kernel void look_up(__global const float *table, const int rings, const int azimuths, const int w_terms,
                       __global const int2 *cell, __global const float4 *place, __global float4 *value) {
     const int2 below = cell[get_global_id(0)];
     const float4 at = place[get_global_id(0)];
     const float4 across = spline(at.x), along = spline(at.y);
-    long taken[16];
-    float weight[16];
-    ROLLED for (int i = 0; i < 4; ++i) {
+    long taken[TAPS * TAPS];
+    float weight[TAPS * TAPS];
+    ROLLED for (int i = 0; i < TAPS; ++i) {
         int opposite;
         const long ring = ring_of(below.x - 1 + i, rings, &opposite);
         const int first = below.y - 1 + (opposite ? azimuths / 2 : 0) + azimuths;
-        ROLLED for (int j = 0; j < 4; ++j) {
-            taken[4 * i + j] = ring * 3 * w_terms * azimuths + (first + j) % azimuths;
-            weight[4 * i + j] = ((const float *)&across)[i] * ((const float *)&along)[j];
+        ROLLED for (int j = 0; j < TAPS; ++j) {
+            taken[TAPS * i + j] = ring * CHANNELS * w_terms * azimuths + (first + j) % azimuths;
+            weight[TAPS * i + j] = ((const float *)&across)[i] * ((const float *)&along)[j];
         }
     }
     float xyz[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    ROLLED for (int c = 0; c < 3; ++c) {
+    ROLLED for (int c = 0; c < CHANNELS; ++c) {
         /* Clenshaw's recurrence */
         __global const float *channel = table + (long)c * w_terms * azimuths;
         float b1 = 0.0f, b2 = 0.0f;

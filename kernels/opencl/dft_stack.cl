@@ -9,34 +9,59 @@
  *   F[k]      = sum_n2 A[k mod N1][n2] exp(2 pi i n2 k / N)       for the k kept
  *
  * The first pairs n1 with N1 - n1: cosines meet their sum, sines their difference, and k1 serves N1 - k1 too, so
- * N1 / 2 + 1 of either are left. Tables of an axis:
+ * N1 / 2 + 1 of either are left. Frequencies of one k1 are taken KEPT at a time, as a block.
  *
- *   cosine, sine   REAL[pairs][padded]           of 2 pi n1 k1 / N1; k1 padded to whole blocks of STEP along x
- *   turn           REAL[blocks][N2][KEPT][2]     cosine and sine of 2 pi n2 k / N, KEPT frequencies of one k1 a block
- *   first_of       int[blocks]                   a block's k1
- *   place          int[blocks][KEPT]             where F[k] goes: its column or row; -1 for nothing
+ * along_x transforms the rows of samples along x; along_y transforms the columns phi = 0 .. columns - 1 of what it
+ * wrote along y, and stores small phi at -phi, too, for heights are real. Work-items take rows or columns
+ * get_global_size(0) apart, each with scratch of its own: they outgrow the stacks of a driver's threads. Arguments:
  *
- * Set by the host: REAL and its vectors of LANES; STEP, the k1 of real samples that are summed at a time; KEPT;
- * MOST_PAIRS, which bounds pairs. Work-items take rows or columns get_global_size(0) apart, each with `room` vectors of scratch of its own: they
- * outgrow the stacks of a driver's threads.
+ * along_x
+ *   heights     double[ny][nx]                  um    centred
+ *   scale       double                          1/um  1 / H
+ *   first       int                             1     the first of the terms made here, LANES of them
+ *   cosine      REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
+ *   sine        REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
+ *   turn        REAL[blocks][n2][KEPT][2]       1     cosine and sine of 2 pi n2 k / N
+ *   first_of    int[blocks]                     1     the k1 of a block
+ *   place       int[blocks][KEPT]               1     the column of each k; -1 for none
+ *   axis        Axis                            1     sizes along x
+ *   ny          int                             1     rows
+ *   scratch     VECTOR[work-items][room]        1     room >= 3 nx
+ *   room        long                            1     vectors of scratch of a work-item
+ *   narrow      VECTOR[columns][ny][2]          1     result: real and imaginary part, y from the middle sample on
+ *
+ * along_y
+ *   narrow      VECTOR[columns][ny][2]          1     as along_x wrote it
+ *   cosine      REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
+ *   sine        REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
+ *   turn        REAL[blocks][n2][KEPT][2]       1     cosine and sine of 2 pi n2 k / N
+ *   first_of    int[blocks]                     1     the k1 of a block
+ *   place       int[blocks][KEPT]               1     the row of each k; -1 for none
+ *   axis        Axis                            1     sizes along y
+ *   columns     int                             1     of narrow
+ *   scratch     VECTOR[work-items][room]        1     room >= 2 ny
+ *   room        long                            1     vectors of scratch of a work-item
+ *   first       int                             1     the first of the terms made here
+ *   terms       int                             1     of the stack; those beyond are not stored
+ *   reach       int                             1     columns left of phi = 0
+ *   phi_max     int                             1     the last column
+ *   rows        int                             1     of the stack; psi = 0 is the middle one
+ *   mean        REAL                            1     1 / samples
+ *   stack       REAL[rows][reach + phi_max + 1][2][terms]   1   result: F_n, real and imaginary parts
+ *
+ * Set by the host: REAL and LANES, a vector of 64 bytes; STEP, the k1 of real samples that are summed at a time; KEPT;
+ * MOST_PAIRS, which bounds pairs.
  */
 
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-#define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
-/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
-#define APART __attribute__((noinline))
-#define INLINE __attribute__((always_inline))
-#define JOIN(a, b) a##b
-#define NAME(a, b) JOIN(a, b)
+#include "common.cl"
 #define VECTOR NAME(REAL, LANES)
 
-/* n = n1 n2 samples; pairs = n1 / 2 + 1, padded to whole blocks; blocks of frequencies */
+/* n = n1 n2 samples; pairs = n1 / 2 + 1, padded to whole steps; blocks of frequencies */
 typedef struct {
     int n, n1, n2, pairs, padded, blocks;
 } Axis;
 
-/* T_first and T_(first - 1) of eight samples t, doubling the order: T_2n = 2 T_n^2 - 1, T_(2n - 1) = 2 T_n T_(n-1) - t */
+/* T_first and T_(first - 1) of t, doubling the order: T_2n = 2 T_n^2 - 1, T_(2n - 1) = 2 T_n T_(n-1) - t */
 static void chebyshev(const double8 t, const int first, double8 *term, double8 *before) {
     double8 here = 1.0, below = t;
     ROLLED for (int bit = first ? 31 - clz(first) : -1; bit >= 0; --bit) {
@@ -50,19 +75,19 @@ static void chebyshev(const double8 t, const int first, double8 *term, double8 *
     *before = below;
 }
 
-/* terms first .. first + LANES - 1 of eight samples t, a vector each */
+/* Terms first .. first + LANES - 1 of DOUBLES samples t: out[sample][term]. */
 static APART void terms_of(const double8 t, const int first, __global REAL *out) {
     double8 before, term;
     chebyshev(t, first, &term, &before);
     ROLLED for (int n = 0; n < LANES; ++n) {
-        UNROLL for (int i = 0; i < 8; ++i) out[i * LANES + n] = ((const double *)&term)[i];
+        UNROLL for (int i = 0; i < DOUBLES; ++i) out[i * LANES + n] = ((const double *)&term)[i];
         const double8 next = 2.0 * t * term - before;
         before = term;
         term = next;
     }
 }
 
-/* Samples n1 = 0 .. and their mirror images N1 - n1, `stride` apart: their sums and differences, `parts` vectors each. */
+/* Samples n1 = 0 .. and their mirror images N1 - n1, `stride` apart: sums and differences, `parts` vectors each. */
 static INLINE void pair(__global const VECTOR *sample, const long stride, const Axis axis, const int parts, VECTOR *sum,
                         VECTOR *difference) {
     ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1) {
@@ -80,7 +105,7 @@ static INLINE void pair(__global const VECTOR *sample, const long stride, const 
 static INLINE void sums_over_n1(const VECTOR *sum, const VECTOR *difference, __global const REAL *cosine,
                                 __global const REAL *sine, const Axis axis, const int parts, const int step, VECTOR *c,
                                 VECTOR *s) {
-    VECTOR even[2 * STEP], odd[2 * STEP];
+    VECTOR even[PARTS * STEP], odd[PARTS * STEP];
     UNROLL for (int j = 0; j < parts * step; ++j) even[j] = odd[j] = 0;
     ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1)
         UNROLL for (int j = 0; j < step; ++j) {
@@ -96,12 +121,13 @@ static INLINE void sums_over_n1(const VECTOR *sum, const VECTOR *difference, __g
     }
 }
 
-/* A[k1][n2] = c + i s and A[N1 - k1][n2] = c - i s, of real samples or of complex ones (parts = 2). */
+/* A[k1][n2] = c + i s and A[N1 - k1][n2] = c - i s, of real samples (parts = 1) or of complex ones (2). */
 static INLINE void store_pair(const VECTOR *c, const VECTOR *s, const int k1, const int n2, const Axis axis,
                               const int parts, __global VECTOR *a) {
     if (k1 >= axis.pairs) return;
-    const VECTOR im_c = parts == 2 ? c[1] : (VECTOR)0, im_s = parts == 2 ? s[1] : (VECTOR)0;
-    __global VECTOR *here = a + 2 * (k1 * axis.n2 + n2), *mirrored = a + 2 * ((axis.n1 - k1) * axis.n2 + n2);
+    const VECTOR im_c = parts == PARTS ? c[1] : (VECTOR)0, im_s = parts == PARTS ? s[1] : (VECTOR)0;
+    __global VECTOR *here = a + PARTS * (k1 * axis.n2 + n2);
+    __global VECTOR *mirrored = a + PARTS * ((axis.n1 - k1) * axis.n2 + n2);
     here[0] = c[0] - im_s;
     here[1] = im_c + s[0];
     if (k1 > 0 && 2 * k1 < axis.n1) {
@@ -110,14 +136,14 @@ static INLINE void store_pair(const VECTOR *c, const VECTOR *s, const int k1, co
     }
 }
 
-/* The first step: A[k1][n2] of every k1 and n2, as (re, im) pairs; `parts` 1 for real samples, 2 for complex ones. */
+/* The first step: A[k1][n2] of every k1 and n2, real and imaginary part. */
 static INLINE void first_step(__global const VECTOR *sample, __global const REAL *cosine, __global const REAL *sine,
                               const Axis axis, const int parts, const int step, __global VECTOR *a) {
     ROLLED for (int n2 = 0; n2 < axis.n2; ++n2) {
-        VECTOR sum[2 * MOST_PAIRS], difference[2 * MOST_PAIRS];
+        VECTOR sum[PARTS * MOST_PAIRS], difference[PARTS * MOST_PAIRS];
         pair(sample + parts * n2, parts * axis.n2, axis, parts, sum, difference);
         ROLLED for (int k = 0; k < axis.pairs; k += step) {
-            VECTOR c[2 * STEP], s[2 * STEP];
+            VECTOR c[PARTS * STEP], s[PARTS * STEP];
             sums_over_n1(sum, difference, cosine + k, sine + k, axis, parts, step, c, s);
             ROLLED for (int j = 0; j < step; ++j) store_pair(c + parts * j, s + parts * j, k + j, n2, axis, parts, a);
         }
@@ -132,18 +158,19 @@ static APART void first_step_of_real(__global const VECTOR *sample, __global con
 /* Complex samples take one k1 at a time: their sums are as many vectors as those of two k1 of real ones. */
 static APART void first_step_of_complex(__global const VECTOR *sample, __global const REAL *cosine,
                                         __global const REAL *sine, const Axis axis, __global VECTOR *a) {
-    first_step(sample, cosine, sine, axis, 2, 1, a);
+    first_step(sample, cosine, sine, axis, PARTS, 1, a);
 }
 
-/* The second step: F of the KEPT frequencies of a block, from the n2 values A of its k1: f[frequency][re, im]. */
-static APART void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[2]) {
+/* The second step: F of the KEPT frequencies of a block, from the n2 values A of its k1: f[frequency][part]. */
+static APART void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[PARTS]) {
     VECTOR re[KEPT], im[KEPT];
     UNROLL for (int q = 0; q < KEPT; ++q) re[q] = im[q] = 0;
     ROLLED for (int n2 = 0; n2 < n2s; ++n2) {
+        const VECTOR a_re = a[PARTS * n2], a_im = a[PARTS * n2 + 1];
         UNROLL for (int q = 0; q < KEPT; ++q) {
             const VECTOR c = turn[2 * (n2 * KEPT + q)], s = turn[2 * (n2 * KEPT + q) + 1];
-            re[q] = fma(c, a[2 * n2], fma(-s, a[2 * n2 + 1], re[q]));
-            im[q] = fma(s, a[2 * n2], fma(c, a[2 * n2 + 1], im[q]));
+            re[q] = fma(c, a_re, fma(-s, a_im, re[q]));
+            im[q] = fma(s, a_re, fma(c, a_im, im[q]));
         }
     }
     UNROLL for (int q = 0; q < KEPT; ++q) {
@@ -152,45 +179,45 @@ static APART void second_step(__global const VECTOR *a, __global const REAL *tur
     }
 }
 
-/* Rows of samples, transformed along x.
- *
- *   heights  double[ny][nx]                    centred; times scale they are t
- *   narrow   VECTOR[columns][ny][2]            real and imaginary part, y counted from the middle sample
- */
+/* Terms of the samples of a row from x = begin to end, at sample[to + x]; DOUBLES at a time, and what spills over the
+ * end is written again. */
+static INLINE void row_terms(__global const double *row, const double scale, const int first, const int begin,
+                             const int end, const int to, __global VECTOR *sample) {
+    ROLLED for (int x = begin; x < end; x += DOUBLES) {
+        double8 t = 0.0;
+        if (x + DOUBLES <= end) t = vload8(0, row + x);
+        else ROLLED for (int i = 0; i < end - x; ++i) ((double *)&t)[i] = row[x + i];
+        terms_of(scale * t, first, (__global REAL *)(sample + to + x));
+    }
+}
+
 __kernel void along_x(__global const double *heights, const double scale, const int first, __global const REAL *cosine,
                       __global const REAL *sine, __global const REAL *turn, __global const int *first_of,
-                      __global const int *place, const Axis axis, const int ny, __global VECTOR *scratch, const long room,
-                      __global VECTOR *narrow) {
-    const int nx = axis.n;
+                      __global const int *place, const Axis axis, const int ny, __global VECTOR *scratch,
+                      const long room, __global VECTOR *narrow) {
+    const int nx = axis.n, middle = nx / 2;
     __global VECTOR *sample = scratch + get_global_id(0) * room, *a = sample + nx;
 
     ROLLED for (int y = get_global_id(0); y < ny; y += get_global_size(0)) {
         __global const double *row = heights + (long)((y + ny / 2) % ny) * nx;
-        /* the samples from the middle on, then those before it; what spills over their ends is written again */
-        ROLLED for (int part = 0; part < 2; ++part) {
-            const int begin = part ? 0 : nx / 2, end = part ? nx / 2 : nx, to = part ? nx - nx / 2 : -(nx / 2);
-            ROLLED for (int x = begin; x < end; x += 8) {
-                double8 t = 0.0;
-                if (x + 8 <= end) t = vload8(0, row + x);
-                else ROLLED for (int i = 0; i < end - x; ++i) ((double *)&t)[i] = row[x + i];
-                terms_of(scale * t, first, (__global REAL *)(sample + to + x));
-            }
-        }
+        /* the samples from the middle on, then those before it */
+        ROLLED for (int part = 0; part < 2; ++part)
+            row_terms(row, scale, first, part ? 0 : middle, part ? middle : nx, part ? nx - middle : -middle, sample);
         first_step_of_real(sample, cosine, sine, axis, a);
         ROLLED for (int b = 0; b < axis.blocks; ++b) {
-            VECTOR f[KEPT][2];
-            second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
+            VECTOR f[KEPT][PARTS];
+            second_step(a + (long)PARTS * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
             ROLLED for (int q = 0; q < KEPT; ++q) {
                 const int column = place[b * KEPT + q];
                 if (column < 0) continue;
-                narrow[2 * ((long)column * ny + y)] = f[q][0];
-                narrow[2 * ((long)column * ny + y) + 1] = f[q][1];
+                narrow[PARTS * ((long)column * ny + y)] = f[q][0];
+                narrow[PARTS * ((long)column * ny + y) + 1] = f[q][1];
             }
         }
     }
 }
 
-/* the first `lit` lanes of a coefficient's real and imaginary parts, `terms` apart */
+/* The first `lit` lanes of a coefficient's real and imaginary parts, which are `terms` apart. */
 static APART void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
     ROLLED for (int n = 0; n < lit; ++n) {
         to[n] = ((const REAL *)&re)[n];
@@ -198,10 +225,6 @@ static APART void store_terms(const VECTOR re, const VECTOR im, const int lit, c
     }
 }
 
-/* Columns of `narrow`, phi = 0 .. columns - 1, transformed along y; small phi also serve -phi, for heights are real.
- *
- *   stack    REAL[rows][reach + phi_max + 1][2][terms]     phi from -reach on, psi from -(rows - 1) / 2 on
- */
 __kernel void along_y(__global const VECTOR *narrow, __global const REAL *cosine, __global const REAL *sine,
                       __global const REAL *turn, __global const int *first_of, __global const int *place,
                       const Axis axis, const int columns, __global VECTOR *scratch, const long room, const int first,
@@ -209,18 +232,18 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *cosine
                       __global REAL *stack) {
     __global VECTOR *a = scratch + get_global_id(0) * room;
     const int lit = min(LANES, terms - first);
+    const long width = reach + phi_max + 1;
 
     ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
-        first_step_of_complex(narrow + 2L * phi * axis.n, cosine, sine, axis, a);
+        first_step_of_complex(narrow + (long)PARTS * phi * axis.n, cosine, sine, axis, a);
         ROLLED for (int b = 0; b < axis.blocks; ++b) {
-            VECTOR f[KEPT][2];
-            second_step(a + 2L * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
+            VECTOR f[KEPT][PARTS];
+            second_step(a + (long)PARTS * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
             ROLLED for (int q = 0; q < KEPT; ++q) {
                 const int row = place[b * KEPT + q];
                 if (row < 0) continue;
-                const long width = reach + phi_max + 1;
-                __global REAL *here = stack + ((row * width + reach + phi) * 2) * terms + first;
-                __global REAL *mirror = stack + (((rows - 1 - row) * width + reach - phi) * 2) * terms + first;
+                __global REAL *here = stack + (row * width + reach + phi) * PARTS * terms + first;
+                __global REAL *mirror = stack + ((rows - 1 - row) * width + reach - phi) * PARTS * terms + first;
                 if (phi <= phi_max) store_terms(mean * f[q][0], mean * f[q][1], lit, terms, here);
                 if (phi > 0 && phi <= reach) store_terms(mean * f[q][0], -mean * f[q][1], lit, terms, mirror);
             }

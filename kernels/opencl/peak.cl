@@ -1,18 +1,15 @@
-/* The device's own peak: chains of fused multiply-adds that nothing but arithmetic bounds.
+/* The device's own peak: chains of fused multiply-adds that nothing but arithmetic bounds. Each step is 8 independent
+ * FMAs of whole vectors, enough to hide their latency: 16 LANES floating-point operations. Arguments:
  *
- *   out  REAL[work-items]   keeps the compiler from removing the work
+ * peak
+ *   steps  int                1   of every chain
+ *   out    REAL[work-items]   1   result: keeps the compiler from removing the work
  *
- * Each step is 8 independent FMAs of whole vectors, enough to hide their latency: 16 LANES floating-point operations.
- * Set by the host: LANES, 16 for float or 8 for double.
+ * Set by the host: REAL and LANES, a vector of 64 bytes.
  */
-#if LANES == 16
-typedef float REAL;
-typedef float16 VECTOR;
-#else
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-typedef double REAL;
-typedef double8 VECTOR;
-#endif
+
+#include "common.cl"
+#define VECTOR NAME(REAL, LANES)
 
 __kernel void peak(const int steps, __global REAL *out) {
     const VECTOR scale = (REAL)0.999, shift = (REAL)1e-3 * (REAL)get_global_id(0);
@@ -29,7 +26,7 @@ __kernel void peak(const int steps, __global REAL *out) {
     }
     const VECTOR sum = ((a + b) + (c + d)) + ((e + f) + (g + h));
     const REAL *lane = (const REAL *)&sum;
-    REAL total = 0;
-    for (int i = 0; i < LANES; ++i) total += lane[i];
-    out[get_global_id(0)] = total;
+    REAL all = 0;
+    for (int i = 0; i < LANES; ++i) all += lane[i];
+    out[get_global_id(0)] = all;
 }

@@ -1,4 +1,4 @@
-/* Power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2 on a polar grid, from the Chebyshev stack.
+/* Polar power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2, from the Chebyshev stack.
  *
  *   P(f; s) = sum_n (2 - [n = 0]) i^n J_n(s H) F_n(f),  s = k w          (Jacobi-Anger; F_n as in eq. 8 of
  *                                                                          Dhillon et al. 2014, of T_n(h/H))
@@ -6,30 +6,35 @@
  * With A the sum over even n and i B that over odd n, P(f) = A + i B; heights are real, so F_n(-f) is the conjugate
  * and |P(-f)| = |A - i B|: both half turns come from one gather.
  *
- *   stack    float[rows][columns][2][16 * blocks]    F_n: real and imaginary parts, terms side by side
- *   decay    float[2 * reach_x + 1], then [2 * reach_y + 1]   the window's transform at j spacings from its peak
- *   radius   double[radii]                           r, 1/um
- *   azimuth  double[tiles][2][16]                    cos phi, then sin phi, of half a turn
- *   series   float[16 * blocks][s_nodes]             (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last term
- *   spectrum float[2 * tiles][radii][s_nodes][16]    E: the tiles of the half turn, then those half a turn on;
- *                                                    azimuths of a tile side by side
- *   fx_max, fy_max                                   the scan's band, 1/um: beyond it nothing is known and E = 0
- *
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
- * the point. One work-item, one radius and the sixteen azimuths of a tile.
+ * the point. One work-item, one radius and the LANES azimuths of a tile. Arguments; taps = 2 * reach + 1:
  *
- * Given at launch: terms, even; the stack's blocks; s_nodes; reach_x and reach_y. Set by the host: USUAL_TAPS, the width
- * of a window whose loop along x is written out; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
+ * polar_power_spectrum
+ *   stack     float[rows][columns][2][LANES * blocks]   1   F_n: real and imaginary parts, terms side by side
+ *   decay     float[taps_x + taps_y]                 1     the window's transform at j spacings, of x, then of y
+ *   grid      Grid                                   1/um  frequencies of the stack and the window's width
+ *   radius    double[radii]                          1/um  r
+ *   radii     int                                    1     of E
+ *   azimuth   double[tiles][2][LANES]                1     cos phi, then sin phi, of half a turn
+ *   series    float[LANES * blocks][s_nodes]         1     (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last
+ *   terms     int                                    1     of the series, even
+ *   blocks    int                                    1     vectors of terms in the stack
+ *   s_nodes   int                                    1     nodes in s
+ *   reach_x   int                                    1     coefficients on either side of the nearest, along x
+ *   reach_y   int                                    1     and along y
+ *   fx_max    double                                 1/um  Nyquist limit of the scan along x: E = 0 beyond it
+ *   fy_max    double                                 1/um  and along y
+ *   spectrum  float[HALVES * tiles][radii][s_nodes][LANES]   1   result: E of the tiles of the half turn, then of those
+ *                                                          half a turn on; azimuths of a tile side by side
+ *
+ * Set by the host: LANES, 16; USUAL_TAPS, the width of a window whose loop along x is written out; MOST_BLOCKS and
+ * MOST_TAPS, which bound what a work-item keeps.
  */
 
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-#define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
-/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
-#define APART __attribute__((noinline))
-#define INLINE __attribute__((always_inline))
+#include "common.cl"
+#define CELL (PARTS * LANES) /* floats of a cell of the stack, for each block of terms */
 
-/* E is larger than caches: lines written past them need not be read first */
+/* E is larger than caches: lines written past them need not be read first. */
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_nontemporal_store)
 #define STORE(value, to) __builtin_nontemporal_store(value, (__global float16 *)(to))
@@ -39,28 +44,16 @@
 #define STORE(value, to) vstore16(value, 0, to)
 #endif
 
-typedef struct {
-    double dfx, dfy;            /* spacing of the DFT's frequencies, 1/um */
-    double inverse_2_variance;  /* 1 / (2 sigma_f^2), um^2 */
-    int columns, row_zero, column_zero;
-} Grid;
+WINDOW_WEIGHTS(weights_of_peak, float16, float)
 
-/* exp(-(d - j df)^2 / (2 sigma_f^2)), j = -reach .. reach, of sixteen azimuths at once: weight[tap] holds a tap's.
- * One pair of exponentials, then products with `decay`. */
-static void window_weights(const float16 d, const float df, const float inverse, __global const float *decay,
+/* exp(-(d - j df)^2 / (2 sigma_f^2)), j = -reach .. reach, of a tile's azimuths at once: weight[tap] holds a tap's. */
+static void window_weights(const float16 d, const float df, const float inverse_2_variance, __global const float *decay,
                            const int reach, float16 *weight) {
-    const float16 peak = exp(-d * d * inverse), ratio = exp(2.0f * df * inverse * d), back = 1.0f / ratio;
-    float16 up = peak, down = peak;
-    weight[reach] = peak;
-    ROLLED for (int j = 1; j <= reach; ++j) {
-        up *= ratio;
-        down *= back;
-        weight[reach + j] = up * decay[reach + j];
-        weight[reach - j] = down * decay[reach - j];
-    }
+    const float16 peak = exp(-d * d * inverse_2_variance), ratio = exp(2.0f * df * inverse_2_variance * d);
+    weights_of_peak(peak, ratio, decay, reach, weight);
 }
 
-/* F_n(f) of one block of 16 terms: the window along x, row by row, then along y; `cell` floats from cell to cell */
+/* F_n(f) of one block of terms: the window along x, row by row, then along y; `cell` floats from cell to cell. */
 static INLINE void gather(__global const float *corner, const int columns, const int cell, const int taps_x,
                           const int taps_y, const float16 *along_x, const float16 *along_y, const int lane, float16 *re,
                           float16 *im) {
@@ -70,11 +63,11 @@ static INLINE void gather(__global const float *corner, const int columns, const
         __global const float *row = corner + (long)t * columns * cell;
         float16 row_re = 0.0f, row_im = 0.0f;
         UNROLL for (int s = 0; s < taps_x; ++s) {
-            const float16 weight = ((const float *)along_x)[16 * s + lane];
+            const float16 weight = ((const float *)along_x)[LANES * s + lane];
             row_re = fma(weight, vload16(0, row + s * cell), row_re);
-            row_im = fma(weight, vload16(0, row + s * cell + cell / 2), row_im);
+            row_im = fma(weight, vload16(0, row + s * cell + cell / PARTS), row_im);
         }
-        const float16 weight = ((const float *)along_y)[16 * t + lane];
+        const float16 weight = ((const float *)along_y)[LANES * t + lane];
         sum_re = fma(weight, row_re, sum_re);
         sum_im = fma(weight, row_im, sum_im);
     }
@@ -82,45 +75,50 @@ static INLINE void gather(__global const float *corner, const int columns, const
     *im = sum_im;
 }
 
-/* rows and columns of sixteen vectors change places: halves, quarters, pairs and single lanes in turn */
+/* Rows and columns of LANES vectors change places: halves, quarters, pairs and single lanes in turn. */
 static APART void transpose(float16 *m) {
-    ROLLED for (int i = 0; i < 8; ++i) {
-        const float16 a = m[i], b = m[i + 8];
+    ROLLED for (int i = 0; i < LANES / 2; ++i) {
+        const float16 a = m[i], b = m[i + LANES / 2];
         m[i] = (float16)(a.lo, b.lo);
-        m[i + 8] = (float16)(a.hi, b.hi);
+        m[i + LANES / 2] = (float16)(a.hi, b.hi);
     }
-    ROLLED for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < LANES / 2; ++i) {
         const int k = (i & 3) + 2 * (i & 4);
         const float16 a = m[k], b = m[k + 4];
         m[k] = (float16)(a.s0123, b.s0123, a.s89ab, b.s89ab);
         m[k + 4] = (float16)(a.s4567, b.s4567, a.scdef, b.scdef);
     }
-    ROLLED for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < LANES / 2; ++i) {
         const int k = (i & 1) + 2 * (i & 6);
         const float16 a = m[k], b = m[k + 2];
         m[k] = (float16)(a.s01, b.s01, a.s45, b.s45, a.s89, b.s89, a.scd, b.scd);
         m[k + 2] = (float16)(a.s23, b.s23, a.s67, b.s67, a.sab, b.sab, a.sef, b.sef);
     }
-    ROLLED for (int i = 0; i < 8; ++i) {
+    ROLLED for (int i = 0; i < LANES / 2; ++i) {
         const int k = 2 * i;
         const float16 a = m[k], b = m[k + 1];
-        m[k] = (float16)(a.s0, b.s0, a.s2, b.s2, a.s4, b.s4, a.s6, b.s6, a.s8, b.s8, a.sa, b.sa, a.sc, b.sc, a.se, b.se);
-        m[k + 1] = (float16)(a.s1, b.s1, a.s3, b.s3, a.s5, b.s5, a.s7, b.s7, a.s9, b.s9, a.sb, b.sb, a.sd, b.sd, a.sf, b.sf);
+        m[k] =
+            (float16)(a.s0, b.s0, a.s2, b.s2, a.s4, b.s4, a.s6, b.s6, a.s8, b.s8, a.sa, b.sa, a.sc, b.sc, a.se, b.se);
+        m[k + 1] =
+            (float16)(a.s1, b.s1, a.s3, b.s3, a.s5, b.s5, a.s7, b.s7, a.s9, b.s9, a.sb, b.sb, a.sd, b.sd, a.sf, b.sf);
     }
 }
 
-/* Where the window lies for sixteen azimuths of a radius: its weights along x and y, its first column and row; turned:
- * the opposite of f is gathered, for the stack holds the half plane fx >= 0; known: within the scan's band */
+/* Where the window lies for the azimuths of a tile at one radius. */
 typedef struct {
-    float16 weight[2][MOST_TAPS];
-    int16 first[2], turned, known;
+    float16 weight[2][MOST_TAPS]; /* along x and y */
+    int16 first[2];               /* column and row of the first coefficient */
+    int16 turned;                 /* the opposite of f is gathered, for the stack holds the half plane fx >= 0 */
+    int16 known;                  /* within the Nyquist limits */
 } Window;
 
-/* rint below 2^51, which PoCL works out in twenty operations: 1.5 * 2^52 leaves no digits for what follows the point */
-static double16 nearest(const double16 x) { return (x + 6755399441055744.0) - 6755399441055744.0; }
+/* rint below 2^51: PoCL takes twenty operations for rint, and 1.5 * 2^52 leaves no digits after the point. */
+#define ROUNDING 6755399441055744.0
+static double16 nearest(const double16 x) { return (x + ROUNDING) - ROUNDING; }
 
-static APART void place_window(const Grid grid, __global const float *decay, __global const double *azimuth, const double radius,
-                         const double fx_max, const double fy_max, const int reach_x, const int reach_y, Window *window) {
+static APART void place_window(const Grid grid, __global const float *decay, __global const double *azimuth,
+                               const double radius, const double fx_max, const double fy_max, const int reach_x,
+                               const int reach_y, Window *window) {
     const double16 turn = select((double16)1.0, (double16)-1.0, radius * vload16(0, azimuth) < 0.0);
     const int origin[2] = {grid.column_zero, grid.row_zero}, reach[2] = {reach_x, reach_y};
     const double df[2] = {grid.dfx, grid.dfy}, f_max[2] = {fx_max, fy_max};
@@ -135,28 +133,31 @@ static APART void place_window(const Grid grid, __global const float *decay, __g
     }
 }
 
-/* F_n at one azimuth of a window, zero beyond the scan's band: [2][blocks][16 azimuths] */
+/* F_n at one azimuth of a tile, zero beyond the Nyquist limits: f_n[part][blocks * LANES vectors][lane = azimuth]. */
 static APART void gather_azimuth(__global const float *stack, const int columns, const int blocks, const int taps_x,
-                           const int taps_y, const Window *window, const int lane, float16 *f_n) {
+                                 const int taps_y, const Window *window, const int lane, float16 *f_n) {
     if (!((const int *)&window->known)[lane]) {
-        ROLLED for (int b = 0; b < 2 * blocks; ++b) f_n[16 * b + lane] = 0.0f;
+        ROLLED for (int b = 0; b < PARTS * blocks; ++b) f_n[LANES * b + lane] = 0.0f;
         return;
     }
-    const int cell = 32 * blocks;
-    const long first = (long)((const int *)&window->first[1])[lane] * columns + ((const int *)&window->first[0])[lane];
+    const int cell = CELL * blocks;
+    const int first_column = ((const int *)&window->first[0])[lane], first_row = ((const int *)&window->first[1])[lane];
+    const long first = (long)first_row * columns + first_column;
     ROLLED for (int b = 0; b < blocks; ++b) {
-        __global const float *corner = stack + first * cell + 16 * b;
-        float16 *re_b = f_n + 16 * b + lane, *im_b = re_b + 16 * blocks;
-        if (taps_x == USUAL_TAPS && cell == 32)
-            gather(corner, columns, 32, USUAL_TAPS, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
+        __global const float *corner = stack + first * cell + LANES * b;
+        float16 *re_b = f_n + LANES * b + lane, *im_b = re_b + LANES * blocks;
+        /* with the usual window and one block of terms, the compiler knows every address of a row */
+        if (taps_x == USUAL_TAPS && cell == CELL)
+            gather(corner, columns, CELL, USUAL_TAPS, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
         else
             gather(corner, columns, cell, taps_x, taps_y, window->weight[0], window->weight[1], lane, re_b, im_b);
     }
 }
 
-/* E at one node in s from F_n, [terms], azimuths side by side; `opposite` takes those of the opposite azimuths */
-static APART void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms, const int s_nodes,
-                          __global const float *series, __global float *here, __global float *opposite) {
+/* E at one node in s from F_n, re and im [terms][azimuths]; `opposite` takes those of the opposite azimuths. */
+static APART void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms,
+                                const int s_nodes, __global const float *series, __global float *here,
+                                __global float *opposite) {
     float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
     ROLLED for (int n = 0; n < terms; n += 2) {
         const float16 even = series[n * s_nodes], odd = series[(n + 1) * s_nodes];
@@ -173,21 +174,22 @@ static APART void power_at_node(const float16 *re, const float16 *im, const int1
 }
 
 __kernel void polar_power_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
-                             __global const double *radius, const int radii, __global const double *azimuth,
-                             __global const float *series, const int terms, const int blocks, const int s_nodes,
-                             const int reach_x, const int reach_y, const double fx_max, const double fy_max,
-                             __global float *spectrum) {
+                                   __global const double *radius, const int radii, __global const double *azimuth,
+                                   __global const float *series, const int terms, const int blocks, const int s_nodes,
+                                   const int reach_x, const int reach_y, const double fx_max, const double fy_max,
+                                   __global float *spectrum) {
     const int ring = get_global_id(0), tile = get_global_id(1), tiles = get_global_size(1);
-    __global float *here = spectrum + ((long)tile * radii + ring) * 16 * s_nodes;
-    __global float *opposite = here + (long)tiles * radii * 16 * s_nodes;
+    __global float *here = spectrum + ((long)tile * radii + ring) * s_nodes * LANES;
+    __global float *opposite = here + (long)tiles * radii * s_nodes * LANES;
 
     Window window;
-    place_window(grid, decay, azimuth + 32 * tile, radius[ring], fx_max, fy_max, reach_x, reach_y, &window);
-    /* real parts, then imaginary parts */
-    float16 f_n[2 * MOST_BLOCKS * 16];
-    ROLLED for (int lane = 0; lane < 16; ++lane)
+    place_window(grid, decay, azimuth + 2 * LANES * tile, radius[ring], fx_max, fy_max, reach_x, reach_y, &window);
+    /* terms are gathered side by side, and used with azimuths side by side */
+    float16 f_n[PARTS * MOST_BLOCKS * LANES];
+    ROLLED for (int lane = 0; lane < LANES; ++lane)
         gather_azimuth(stack, grid.columns, blocks, 2 * reach_x + 1, 2 * reach_y + 1, &window, lane, f_n);
-    ROLLED for (int part = 0; part < 2 * blocks; ++part) transpose(f_n + 16 * part);
+    ROLLED for (int block = 0; block < PARTS * blocks; ++block) transpose(f_n + LANES * block);
     ROLLED for (int j = 0; j < s_nodes; ++j)
-        power_at_node(f_n, f_n + 16 * blocks, window.turned, terms, s_nodes, series + j, here + 16 * j, opposite + 16 * j);
+        power_at_node(f_n, f_n + LANES * blocks, window.turned, terms, s_nodes, series + j, here + LANES * j,
+                      opposite + LANES * j);
 }

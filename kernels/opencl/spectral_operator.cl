@@ -1,50 +1,90 @@
 /* Spectral integration as a linear operator from E(r, s) to a ring of the polar table, the same for every azimuth.
+ * docs/spectral_operator.md derives it, with a drawing of the (r, s) plane.
  *
- *   I(rho, phi, w) = sum_l weights[l] E(rho / l, phi, 2 pi |w| / l)      in X, Y and Z (docs/conventions.md, less C cos ti)
- *   E(r, s)        = sum_(a, j) L_a(r) C_j(s) E(r_a, s_j)                L Lagrange's polynomials on ORDER nodes about r,
- *                                                                         C cardinal functions of Chebyshev nodes
+ *   I(rho, phi, w) = sum_l weights[l] E(rho / l, phi, 2 pi |w| / l)   in X, Y, Z (docs/conventions.md, without C cos ti)
+ *   E(r, s)        = sum_(a, j) L_a(r) C_j(s) E(r_a, s_j)             L Lagrange's polynomials on ORDER radii about r,
+ *                                                                     C cardinal functions of Chebyshev nodes
  *   I(rho, phi, w) = sum_k T_k(2 |w| / w_max - 1) table[k],  w_max = sqrt(4 - rho^2)
  *
  * At a ring and a w, E is wanted along one line through the origin, r = rho kappa and s = 2 pi |w| kappa with
  * kappa = 1 / l. It is taken there at points kappa_p, once for all wavelengths, which are interpolated from it:
  *
  *   G(p, w) = sum_j C_j(2 pi |w| kappa_p) E(rho kappa_p, s_j)
- *   I(w)    = sum_p shares[p] G(p, w),   shares[p] = sum_l weights[l] L_p(1 / l)
+ *   I(w)    = sum_p point_weights[p] G(p, w),   point_weights[p] = sum_l weights[l] L_p(1 / l)
  *
  * Where points are chosen on radii of E (rho kappa_p = r_a) nothing is interpolated over r; where they are a ring's
- * wavelengths, nothing along the line. A ring t rho has the same lines at t w, where its wavelengths lie at t / l: rings
- * that follow each other share G, as a group, at nodes w_m of its first ring; what I is at nodes of a ring's own follows
- * from the polynomial through these.
+ * wavelengths, nothing along the line. A ring t rho has the same line at t w, where its wavelengths lie at t / l: rings
+ * that follow each other share G, as a group, at nodes w_m of its first ring; what I is at nodes of a ring's own
+ * follows from the polynomial through these.
  *
- * Given at launch: s_nodes, and w_terms, a multiple of 4. Set by the host: ORDER (even); MOST_RINGS of a group;
- * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in
- * registers.
+ * build_operator makes the weights of each group; one work-item, one group. apply_operator makes the table of one group
+ * at the azimuths of a tile and those half a turn on; one work-item, one group and one tile of half a turn. Arguments:
+ *
+ * build_operator
+ *   groups         Group[groups]                      1     of rings
+ *   rings          Ring[rings]                        1     of the table
+ *   first_radius   int[points]                        1     the radius of a point, or the first of the ORDER about it,
+ *                                                           which may be negative
+ *   radius         double[radii]                      1/um  r_a, ascending from 0
+ *   rho            double[rings]                      1     |(u, v)|
+ *   stretch        double[rings]                      1     t: rho of the ring over that of its group's first
+ *   kappa          double[points]                     1/um  kappa_p, ascending in each group
+ *   lambda_um      double[nodes]                      um    wavelengths of every ring's quadrature, ascending
+ *   weights        float4[nodes]                      1     their weights in X, Y, Z; fourth unused
+ *   reflectance    float[...][w_terms]                1     of the material, at each wavelength of a ring and each node
+ *                                                           w_m of its group; 1 outside metals
+ *   to_series      float[s_nodes][s_nodes]            1     C_j = sum_k to_series[k][j] T_k
+ *   w_node         float[w_terms]                     1     w_m over the first ring's w_max, in [0, 1]
+ *   s_max          float                              1/um  where the nodes of E in s end
+ *   s_nodes        int                                1     nodes of E in s
+ *   w_terms        int                                1     nodes w_m; a multiple of W_LANES
+ *   lagrange_r     float[points][ORDER]               1     result: L_a of a point between radii
+ *   cardinal_s     float[points][s_nodes][w_terms]    1     result: C_j at every w_m
+ *   point_weights  float[...][CHANNELS][w_terms]      1     result: for every ring, of all points of its group
+ *   used           int2[rings]                        1     result: the first point of its group that a ring takes
+ *                                                           from, and the one after the last
+ *
+ * apply_operator
+ *   spectrum       float[HALVES * tiles][radii][s_nodes][LANES]   1   E, as polar_power_spectrum.cl writes it
+ *   radii          int                                1     of E
+ *   groups         Group[groups]                      1     as of build_operator
+ *   rings          Ring[rings]                        1     as of build_operator
+ *   first_radius   int[points]                        1     as of build_operator
+ *   lagrange_r     float[points][ORDER]               1     as build_operator wrote it
+ *   cardinal_s     float[points][s_nodes][w_terms]    1     as build_operator wrote it
+ *   point_weights  float[...][CHANNELS][w_terms]      1     as build_operator wrote it
+ *   used           int2[rings]                        1     as build_operator wrote it
+ *   s_nodes        int                                1     nodes of E in s
+ *   w_terms        int                                1     nodes w_m, and terms of the table
+ *   to_w_terms     float[rings][w_terms][w_terms]     1     Chebyshev coefficients over a ring's w from values at its
+ *                                                           group's nodes, [term][node]
+ *   table          float[rings][CHANNELS][w_terms][HALVES * tiles][LANES]   1   result
+ *
+ * Set by the host: LANES, 16, azimuths of a tile; ORDER (even); MOST_RINGS of a group; MOST_S_NODES and MOST_W_TERMS,
+ * which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in registers.
  */
 
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-#define UNROLL _Pragma("unroll")
-#define ROLLED _Pragma("nounroll")  /* copies of a loop's body would cost compiling time and win nothing */
-/* a function that is compiled by itself, called where its loops begin: the compiler's time grows faster than a body's length */
-#define APART __attribute__((noinline))
-#define CHUNK 24  /* points whose G waits in the nearest cache */
+#include "common.cl"
+#define CHUNK 24  /* points whose G waits in the nearest cache: 8 nodes of w take 24 KiB */
+#define W_LANES 4 /* nodes of w in a vector of build_operator */
 
 typedef struct {
-    int first, points;   /* among those of all groups */
+    int first, points;   /* among the points of all groups */
     int on_radii;        /* whether they lie on radii of E */
     int on_nodes;        /* whether they are the wavelengths themselves, from the last to the first, of its one ring */
     int ring, rings;     /* the first, and how many */
 } Group;
 
 typedef struct {
-    int shares;          /* where its rows of `shares` begin, one for every point of its group */
+    int point_weights;   /* where its rows of `point_weights` begin, one for every point of its group */
     int nodes, count;    /* where its quadrature begins, and its length */
-    int reflected;       /* where its rows of `reflectance` begin */
+    int reflectance;     /* where its rows of `reflectance` begin */
 } Ring;
 
-/* r of node i; E(-r, phi) = E(r, phi + pi), so nodes go on below 0 */
-static double node(__global const double *radius, const int i) { return i < 0 ? -radius[-i] : radius[i]; }
+/* r of a radius by its index; E(-r, phi) = E(r, phi + pi), so radii go on below 0. */
+static double radius_at(__global const double *radius, const int i) { return i < 0 ? -radius[-i] : radius[i]; }
 
-/* Lagrange's polynomials on the ORDER nodes at `x`, at `at` */
+/* Lagrange's polynomials on the ORDER nodes at `x`, at `at`. */
 static APART void lagrange(const double *x, const double at, float *weight) {
     ROLLED for (int a = 0; a < ORDER; ++a) {
         double above = 1.0, below = 1.0;
@@ -56,231 +96,223 @@ static APART void lagrange(const double *x, const double at, float *weight) {
     }
 }
 
-/* What one ring takes of each of its group's points. Wavelengths ascend, so the points about them descend. */
-static APART void share_points(const Group group, const Ring ring, const double stretch, __global const double *line,
-                         __global const double *lambda, __global const float4 *weights,
-                         __global const float *reflectance, const int w_terms, __global float *shares,
-                         __global int2 *span) {
+/* L_a of a point between radii, r away from the origin. */
+static APART void radial_weights(__global const double *radius, const int first_radius, const double r,
+                                 __global float *lagrange_r) {
+    double x[ORDER];
+    float weight[ORDER];
+    ROLLED for (int a = 0; a < ORDER; ++a) x[a] = radius_at(radius, first_radius + a);
+    lagrange(x, r, weight);
+    ROLLED for (int a = 0; a < ORDER; ++a) lagrange_r[a] = weight[a];
+}
+
+/* C_j of a point at every w_m; `scale` w_node = 2 s / s_max. */
+static APART void cardinal_functions(const float scale, __global const float *w_node, __global const float *to_series,
+                                     const int s_nodes, const int w_terms, __global float *cardinal_s) {
+    ROLLED for (int m = 0; m < w_terms; m += W_LANES) {
+        const float4 z = scale * vload4(0, w_node + m) - 1.0f;
+        float4 T[MOST_S_NODES];
+        T[0] = 1.0f;
+        T[1] = z;
+        ROLLED for (int k = 2; k < s_nodes; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
+        ROLLED for (int j = 0; j < s_nodes; ++j) {
+            float4 sum = 0.0f;
+            ROLLED for (int k = 0; k < s_nodes; ++k) sum = fma((float4)to_series[k * s_nodes + j], T[k], sum);
+            vstore4(sum, 0, cardinal_s + j * w_terms + m);
+        }
+    }
+}
+
+/* Adds one wavelength's weights to those of a point: weights[channel][m] += xyz[channel] l reflectance[m]. */
+static void add_wavelength(const float4 xyz, const float l, __global const float *reflectance, const int w_terms,
+                           __global float *weights) {
+    const float channel[CHANNELS] = {xyz.x, xyz.y, xyz.z};
+    ROLLED for (int c = 0; c < CHANNELS; ++c)
+        ROLLED for (int m = 0; m < w_terms; m += W_LANES) {
+            __global float *weight = weights + c * w_terms + m;
+            vstore4(fma((float4)(channel[c] * l), vload4(0, reflectance + m), vload4(0, weight)), 0, weight);
+        }
+}
+
+/* The weights of a ring over its group's points. Wavelengths ascend, so the points about them descend. */
+static APART void sum_point_weights(const Group group, const Ring ring, const double stretch,
+                                    __global const double *kappa, __global const double *lambda_um,
+                                    __global const float4 *weights, __global const float *reflectance,
+                                    const int w_terms, __global float *point_weights, __global int2 *used) {
     const int about = group.on_nodes ? 1 : ORDER;
     int first = group.points - about;
-    ROLLED for (int o = 0; o < group.points * 3 * w_terms; ++o) shares[o] = 0.0f;
+    ROLLED for (int o = 0; o < group.points * CHANNELS * w_terms; ++o) point_weights[o] = 0.0f;
     ROLLED for (int l = 0; l < ring.count; ++l) {
         float weight[ORDER] = {1.0f};
         if (group.on_nodes)
             first = group.points - 1 - l;
         else {
-            const double at = stretch / lambda[ring.nodes + l];
-            while (first > 0 && line[first + ORDER / 2 - 1] > at) --first;
+            const double at = stretch / lambda_um[ring.nodes + l];
+            while (first > 0 && kappa[first + ORDER / 2 - 1] > at) --first;
             double x[ORDER];
-            ROLLED for (int a = 0; a < ORDER; ++a) x[a] = line[first + a];
+            ROLLED for (int a = 0; a < ORDER; ++a) x[a] = kappa[first + a];
             lagrange(x, at, weight);
         }
-        if (l == 0) span->y = first + about;
-        const float4 xyz = weights[ring.nodes + l];
-        const float channel[3] = {xyz.x, xyz.y, xyz.z};
-        __global const float *reflected = reflectance + (long)(ring.reflected + l) * w_terms;
+        if (l == 0) used->y = first + about;
         ROLLED for (int a = 0; a < about; ++a)
-            ROLLED for (int c = 0; c < 3; ++c)
-                ROLLED for (int m = 0; m < w_terms; m += 4) {
-                    __global float *share = shares + ((first + a) * 3 + c) * w_terms + m;
-                    vstore4(fma((float4)(channel[c] * weight[a]), vload4(0, reflected + m), vload4(0, share)), 0, share);
-                }
+            add_wavelength(weights[ring.nodes + l], weight[a], reflectance + (long)(ring.reflectance + l) * w_terms,
+                           w_terms, point_weights + (first + a) * CHANNELS * w_terms);
     }
-    span->x = first;
+    used->x = first;
 }
 
-/* The operator of each group of rings. One work-item, one group.
- *
- *   place     int[points]            the radius of a point, or the first of the ORDER about it: may be negative
- *   radius    double[radii]          r_a, 1/um, ascending from 0
- *   rho       double[rings]
- *   stretch   double[rings]          t, of the ring over its group's first
- *   kappa     double[points]         ascending in each group, 1/um
- *   lambda    double[], weights float4[]    um; X, Y, Z: the nodes of every ring's quadrature
- *   reflectance  float[...][w_terms] of the material at each wavelength of a ring and each of its group's nodes of w;
- *                                    1 outside metals
- *   cardinal  float[s_nodes][s_nodes]    C_j = sum_k cardinal[k][j] T_k
- *   w_node    float[w_terms]         nodes of w in [0, 1], shares of the first ring's w_max
- *   along_r   float[points][ORDER]   L_a of a point between radii
- *   along_s   float[points][s_nodes][w_terms]   C_j at every node of w
- *   shares    float[points of its group, for every ring][3][w_terms]
- *   span      int2[rings]            the points of its group that a ring takes from, and the end of them
- */
-__kernel void build_operator(__global const Group *groups, __global const Ring *rings, __global const int *place,
-                             __global const double *radius, __global const double *rho, __global const double *stretch,
-                             __global const double *kappa, __global const double *lambda,
-                             __global const float4 *weights, __global const float *reflectance,
-                             __global const float *cardinal, __global const float *w_node, const float s_max,
-                             const int s_nodes, const int w_terms, __global float *along_r, __global float *along_s, __global float *shares,
-                             __global int2 *span) {
+__kernel void build_operator(__global const Group *groups, __global const Ring *rings,
+                             __global const int *first_radius, __global const double *radius,
+                             __global const double *rho, __global const double *stretch, __global const double *kappa,
+                             __global const double *lambda_um, __global const float4 *weights,
+                             __global const float *reflectance, __global const float *to_series,
+                             __global const float *w_node, const float s_max, const int s_nodes, const int w_terms,
+                             __global float *lagrange_r, __global float *cardinal_s, __global float *point_weights,
+                             __global int2 *used) {
     const Group group = groups[get_global_id(0)];
-    const double from = rho[group.ring];
-    const float w_max = sqrt(fmax(4.0 - from * from, 0.0));
+    const double first_rho = rho[group.ring];
+    const float w_max = sqrt(fmax(4.0 - first_rho * first_rho, 0.0));
 
     ROLLED for (int p = group.first; p < group.first + group.points; ++p) {
-        if (!group.on_radii) {
-            double x[ORDER];
-            ROLLED for (int a = 0; a < ORDER; ++a) x[a] = node(radius, place[p] + a);
-            float weight[ORDER];
-            lagrange(x, from * kappa[p], weight);
-            ROLLED for (int a = 0; a < ORDER; ++a) along_r[p * ORDER + a] = weight[a];
-        }
+        if (!group.on_radii) radial_weights(radius, first_radius[p], first_rho * kappa[p], lagrange_r + p * ORDER);
+        /* s = 2 pi |w| kappa, and 2 s / s_max - 1 is the argument of T_k */
         const float scale = 2.0f * 2.0f * (float)M_PI * w_max * (float)kappa[p] / s_max;
-        ROLLED for (int m = 0; m < w_terms; m += 4) {
-            const float4 z = scale * vload4(0, w_node + m) - 1.0f;
-            float4 T[MOST_S_NODES];
-            T[0] = 1.0f;
-            T[1] = z;
-            ROLLED for (int k = 2; k < s_nodes; ++k) T[k] = 2.0f * z * T[k - 1] - T[k - 2];
-            ROLLED for (int j = 0; j < s_nodes; ++j) {
-                float4 sum = 0.0f;
-                ROLLED for (int k = 0; k < s_nodes; ++k) sum = fma((float4)cardinal[k * s_nodes + j], T[k], sum);
-                vstore4(sum, 0, along_s + ((long)p * s_nodes + j) * w_terms + m);
-            }
-        }
+        cardinal_functions(scale, w_node, to_series, s_nodes, w_terms, cardinal_s + (long)p * s_nodes * w_terms);
     }
     ROLLED for (int i = group.ring; i < group.ring + group.rings; ++i)
-        share_points(group, rings[i], stretch[i], kappa + group.first, lambda, weights, reflectance,
-                     w_terms, shares + (long)rings[i].shares * 3 * w_terms, span + i);
+        sum_point_weights(group, rings[i], stretch[i], kappa + group.first, lambda_um, weights, reflectance, w_terms,
+                          point_weights + (long)rings[i].point_weights * CHANNELS * w_terms, used + i);
 }
 
-/* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both tiles. E comes from the spectrum or, between
+/* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both halves. E comes from the spectrum or, between
  * radii, from what was interpolated: OpenCL C asks for a function each. */
-#define ALONG_LINE(name, memory)                                                                                       \
-    static void name(memory const float *here, memory const float *opposite, __global const float *along_s,            \
-                     const int s_nodes, const int w_terms, float16 (*line)[2]) {                                       \
-        float16 sum[W_BLOCK][2];                                                                                       \
+#define CONTRACT_S(name, memory)                                                                                       \
+    static void name(memory const float *here, memory const float *opposite, __global const float *cardinal_s,         \
+                     const int s_nodes, const int w_terms, float16 (*g)[HALVES]) {                                     \
+        float16 sum[W_BLOCK][HALVES];                                                                                  \
         UNROLL for (int m = 0; m < W_BLOCK; ++m) sum[m][0] = sum[m][1] = 0.0f;                                         \
         ROLLED for (int j = 0; j < s_nodes; ++j) {                                                                     \
             const float16 a = vload16(j, here), b = vload16(j, opposite);                                              \
             UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                 \
-                const float16 c = along_s[j * w_terms + m];                                                            \
+                const float16 c = cardinal_s[j * w_terms + m];                                                         \
                 sum[m][0] = fma(c, a, sum[m][0]);                                                                      \
                 sum[m][1] = fma(c, b, sum[m][1]);                                                                      \
             }                                                                                                          \
         }                                                                                                              \
         UNROLL for (int m = 0; m < W_BLOCK; ++m) {                                                                     \
-            line[m][0] = sum[m][0];                                                                                    \
-            line[m][1] = sum[m][1];                                                                                    \
+            g[m][0] = sum[m][0];                                                                                       \
+            g[m][1] = sum[m][1];                                                                                       \
         }                                                                                                              \
     }
-ALONG_LINE(block_on_radius, __global)
-ALONG_LINE(block_between_radii, __private)
+CONTRACT_S(contract_s_on_radius, __global)
+CONTRACT_S(contract_s_between_radii, __private)
 
-/* E of a point between ORDER radii, at every node in s, for both tiles */
-static APART void between_radii(__global const float *here, __global const float *opposite, const int first,
-                          __global const float *along_r, const int s_nodes, float *e_here, float *e_opposite) {
+/* E of a point between ORDER radii, at every node in s, for both halves. */
+static APART void interpolate_r(__global const float *here, __global const float *opposite, const int first_radius,
+                                __global const float *lagrange_r, const int s_nodes, float *e_here, float *e_opposite) {
     __global const float *row_here[ORDER], *row_opposite[ORDER];
-    ROLLED for (int k = 0; k < ORDER; ++k) {
+    ROLLED for (int a = 0; a < ORDER; ++a) {
         /* below the origin, the half turns change places */
-        const int i = first + k;
-        const long row = 16L * abs(i) * s_nodes;
-        row_here[k] = row + (i < 0 ? opposite : here);
-        row_opposite[k] = row + (i < 0 ? here : opposite);
+        const int i = first_radius + a;
+        const long row = (long)abs(i) * s_nodes * LANES;
+        row_here[a] = row + (i < 0 ? opposite : here);
+        row_opposite[a] = row + (i < 0 ? here : opposite);
     }
     ROLLED for (int j = 0; j < s_nodes; ++j) {
-        float16 a = 0.0f, b = 0.0f;
-        ROLLED for (int k = 0; k < ORDER; ++k) {
-            const float16 weight = along_r[k];
-            a = fma(weight, vload16(j, row_here[k]), a);
-            b = fma(weight, vload16(j, row_opposite[k]), b);
+        float16 sum_here = 0.0f, sum_opposite = 0.0f;
+        ROLLED for (int a = 0; a < ORDER; ++a) {
+            const float16 weight = lagrange_r[a];
+            sum_here = fma(weight, vload16(j, row_here[a]), sum_here);
+            sum_opposite = fma(weight, vload16(j, row_opposite[a]), sum_opposite);
         }
-        vstore16(a, j, e_here);
-        vstore16(b, j, e_opposite);
+        vstore16(sum_here, j, e_here);
+        vstore16(sum_opposite, j, e_opposite);
     }
 }
 
-/* What CHUNK points or fewer add to a ring's X, Y, Z at node m of w, for both tiles.
- *
- *   line    [points][w_terms][2]       G
- *   sum     [3][w_terms][2]            the ring's
- */
-static APART void add_shares(const float16 (*line)[2], const int points, const int m, const int w_terms,
-                       __global const float *shares, float16 (*sum)[2]) {
-    float16 part[3][2];
-    UNROLL for (int c = 0; c < 3; ++c)
-        UNROLL for (int tile = 0; tile < 2; ++tile) part[c][tile] = sum[c * w_terms + m][tile];
-    ROLLED for (int p = 0; p < points; ++p) {
-        const float16 a = line[p * w_terms + m][0], b = line[p * w_terms + m][1];
-        UNROLL for (int c = 0; c < 3; ++c) {
-            const float16 share = shares[(p * 3 + c) * w_terms + m];
-            part[c][0] = fma(share, a, part[c][0]);
-            part[c][1] = fma(share, b, part[c][1]);
-        }
-    }
-    UNROLL for (int c = 0; c < 3; ++c)
-        UNROLL for (int tile = 0; tile < 2; ++tile) sum[c * w_terms + m][tile] = part[c][tile];
-}
-
-/* G of some points of a group at every node of w, for both tiles: [points][w_terms][2] */
-static APART void take_line(const Group group, const int from, const int to, __global const float *here,
-                      __global const float *opposite, __global const int *place, __global const float *along_r,
-                      __global const float *along_s, const int s_nodes, const int w_terms, float16 (*line)[2]) {
-    ROLLED for (int p = group.first + from; p < group.first + to; ++p, line += w_terms) {
-        __global const float *weights = along_s + (long)p * s_nodes * w_terms;
+/* G at the points `from` .. `to` - 1 of a group: g[point][w_terms][half]. */
+static APART void evaluate_g(const Group group, const int from, const int to, __global const float *here,
+                             __global const float *opposite, __global const int *first_radius,
+                             __global const float *lagrange_r, __global const float *cardinal_s, const int s_nodes,
+                             const int w_terms, float16 (*g)[HALVES]) {
+    ROLLED for (int p = group.first + from; p < group.first + to; ++p, g += w_terms) {
+        __global const float *cardinal = cardinal_s + (long)p * s_nodes * w_terms;
         if (group.on_radii) {
-            const long row = (long)place[p] * s_nodes * 16;
+            const long row = (long)first_radius[p] * s_nodes * LANES;
             ROLLED for (int m = 0; m < w_terms; m += W_BLOCK)
-                block_on_radius(here + row, opposite + row, weights + m, s_nodes, w_terms, line + m);
+                contract_s_on_radius(here + row, opposite + row, cardinal + m, s_nodes, w_terms, g + m);
         } else {
-            float e_here[16 * MOST_S_NODES], e_opposite[16 * MOST_S_NODES];
-            between_radii(here, opposite, place[p], along_r + p * ORDER, s_nodes, e_here, e_opposite);
+            float e_here[LANES * MOST_S_NODES], e_opposite[LANES * MOST_S_NODES];
+            interpolate_r(here, opposite, first_radius[p], lagrange_r + p * ORDER, s_nodes, e_here, e_opposite);
             ROLLED for (int m = 0; m < w_terms; m += W_BLOCK)
-                block_between_radii(e_here, e_opposite, weights + m, s_nodes, w_terms, line + m);
+                contract_s_between_radii(e_here, e_opposite, cardinal + m, s_nodes, w_terms, g + m);
         }
     }
 }
 
-/* A ring's Chebyshev terms over its own w, from values at its group's nodes */
-static APART void write_terms(const float16 (*sum)[2], __global const float *w_series, const int w_terms, const int tile,
-                        const int tiles, __global float *ring) {
-    ROLLED for (int c = 0; c < 3; ++c)
+/* Accumulate X, Y and Z of one ring over `points` points, at node m of w and for both halves:
+ *   xyz[c][m][h] += sum_p point_weights[p][c][m] g[p][m][h]     c channel, h half */
+static APART void accumulate_xyz(const float16 (*g)[HALVES], const int points, const int m, const int w_terms,
+                                 __global const float *point_weights, float16 (*xyz)[HALVES]) {
+    /* a copy stays in registers */
+    float16 sum[CHANNELS][HALVES];
+    UNROLL for (int c = 0; c < CHANNELS; ++c)
+        UNROLL for (int h = 0; h < HALVES; ++h) sum[c][h] = xyz[c * w_terms + m][h];
+    ROLLED for (int p = 0; p < points; ++p) {
+        const float16 a = g[p * w_terms + m][0], b = g[p * w_terms + m][1];
+        UNROLL for (int c = 0; c < CHANNELS; ++c) {
+            const float16 weight = point_weights[(p * CHANNELS + c) * w_terms + m];
+            sum[c][0] = fma(weight, a, sum[c][0]);
+            sum[c][1] = fma(weight, b, sum[c][1]);
+        }
+    }
+    UNROLL for (int c = 0; c < CHANNELS; ++c)
+        UNROLL for (int h = 0; h < HALVES; ++h) xyz[c * w_terms + m][h] = sum[c][h];
+}
+
+/* A ring's Chebyshev terms over its own w, from X, Y, Z at its group's nodes. */
+static APART void write_terms(const float16 (*xyz)[HALVES], __global const float *to_w_terms, const int w_terms,
+                              const int tile, const int tiles, __global float *ring) {
+    ROLLED for (int c = 0; c < CHANNELS; ++c)
         ROLLED for (int k = 0; k < w_terms; ++k) {
             float16 a = 0.0f, b = 0.0f;
             ROLLED for (int m = 0; m < w_terms; ++m) {
-                a = fma((float16)w_series[k * w_terms + m], sum[c * w_terms + m][0], a);
-                b = fma((float16)w_series[k * w_terms + m], sum[c * w_terms + m][1], b);
+                a = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][0], a);
+                b = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][1], b);
             }
-            vstore16(a, 2 * tiles * (c * w_terms + k) + tile, ring);
-            vstore16(b, 2 * tiles * (c * w_terms + k) + tile + tiles, ring);
+            const int row = HALVES * tiles * (c * w_terms + k);
+            vstore16(a, row + tile, ring);
+            vstore16(b, row + tile + tiles, ring);
         }
 }
 
-/* The table of one group of rings, at the sixteen azimuths of a tile and those half a turn on. One work-item, one group
- * and one tile of half a turn.
- *
- *   spectrum  float[2 * tiles][radii][s_nodes][16]   E, as polar_power_spectrum.cl writes it
- *   w_series  float[rings][w_terms][w_terms]         Chebyshev coefficients over a ring's w from values at its group's
- *                                                    nodes, [term][w node]
- *   table     float[rings][3][w_terms][16 * 2 * tiles]
- */
 __kernel void apply_operator(__global const float *spectrum, const int radii, __global const Group *groups,
-                             __global const Ring *rings, __global const int *place, __global const float *along_r,
-                             __global const float *along_s, __global const float *shares, __global const int2 *span,
-                             const int s_nodes, const int w_terms, __global const float *w_series,
-                             __global float *table) {
+                             __global const Ring *rings, __global const int *first_radius,
+                             __global const float *lagrange_r, __global const float *cardinal_s,
+                             __global const float *point_weights, __global const int2 *used, const int s_nodes,
+                             const int w_terms, __global const float *to_w_terms, __global float *table) {
     const Group group = groups[get_global_id(0)];
-    const int tile = get_global_id(1), tiles = get_global_size(1);
-    __global const float *here = spectrum + (long)tile * radii * s_nodes * 16;
-    __global const float *opposite = here + (long)tiles * radii * s_nodes * 16;
+    const int tile = get_global_id(1), tiles = get_global_size(1), sums = CHANNELS * w_terms;
+    __global const float *here = spectrum + (long)tile * radii * s_nodes * LANES;
+    __global const float *opposite = here + (long)tiles * radii * s_nodes * LANES;
 
-    float16 sum[MOST_RINGS * 3 * MOST_W_TERMS][2], line[CHUNK * MOST_W_TERMS][2];
-    ROLLED for (int q = 0; q < group.rings * 3 * w_terms; ++q) sum[q][0] = sum[q][1] = 0.0f;
+    float16 xyz[MOST_RINGS * CHANNELS * MOST_W_TERMS][HALVES], g[CHUNK * MOST_W_TERMS][HALVES];
+    ROLLED for (int q = 0; q < group.rings * sums; ++q) xyz[q][0] = xyz[q][1] = 0.0f;
     ROLLED for (int from = 0; from < group.points; from += CHUNK) {
         const int to = min(from + CHUNK, group.points);
-        take_line(group, from, to, here, opposite, place, along_r, along_s, s_nodes, w_terms, line);
+        evaluate_g(group, from, to, here, opposite, first_radius, lagrange_r, cardinal_s, s_nodes, w_terms, g);
         ROLLED for (int i = 0; i < group.rings; ++i) {
-            const int2 taken = span[group.ring + i];
-            const int first = max(from, taken.x), points = min(to, taken.y) - first;
-            __global const float *own = shares + (long)(rings[group.ring + i].shares + first) * 3 * w_terms;
+            const int2 range = used[group.ring + i];
+            const int first = max(from, range.x), points = min(to, range.y) - first;
+            __global const float *own = point_weights + (long)(rings[group.ring + i].point_weights + first) * sums;
             if (points > 0)
                 ROLLED for (int m = 0; m < w_terms; ++m)
-                    add_shares(line + (first - from) * w_terms, points, m, w_terms, own, sum + i * 3 * w_terms);
+                    accumulate_xyz(g + (first - from) * w_terms, points, m, w_terms, own, xyz + i * sums);
         }
     }
     ROLLED for (int i = 0; i < group.rings; ++i) {
         const long ring = group.ring + i;
-        write_terms(sum + i * 3 * w_terms, w_series + ring * w_terms * w_terms, w_terms, tile, tiles,
-                    table + ring * 96 * w_terms * tiles);
+        write_terms(xyz + i * sums, to_w_terms + ring * w_terms * w_terms, w_terms, tile, tiles,
+                    table + ring * sums * HALVES * tiles * LANES);
     }
 }

@@ -5,26 +5,42 @@
  *   i = a - reach .. a + reach,  a = floor(f / df): the anchor of eq. 1.7, not the nearest coefficient
  *   D_n    the DFT of i^n t^n, t = h/H, over the number of samples; stored as (D - least) / range, eq. 1.1
  *
- *   terms    float[rows][columns][2][8 * BLOCKS]   normalised terms: real and imaginary parts, n side by side;
- *                                                  row_zero and column_zero are those of f = 0
- *   extrema  double[2][2][8 * BLOCKS]              least, then range, of real and imaginary parts; 0 beyond the last
- *   pairs    double4[pairs]                        fx, fy in 1/um, s H in radians, fourth unused
- *   power    double[pairs]                         |P|^2, 1 of a mirror at f = 0
+ * Stored numbers are float, all sums double: what is lost is what the normalisation lost. gaussian_power weighs by the
+ * window's transform at the neighbours' distances (alg. 3), sinc_power by the transform of one patch between its DFT
+ * coefficients (1.5.3). One work-item, one pair of a direction and a wavelength, whose neighbourhood must lie within
+ * the stored terms. Arguments:
  *
- * Stored numbers are float, all sums double: what is lost is what the normalisation lost. One work-item, one pair of
- * a direction and a wavelength, whose neighbourhood must lie within the stored terms.
+ * gaussian_power
+ *   terms    float[rows][columns][2][DOUBLES * BLOCKS]   1   normalised terms: real and imaginary parts, n side by side
+ *   extrema  double[2][2][DOUBLES * BLOCKS]   1     least, then range, of real and imaginary parts; 0 beyond the last
+ *   grid     TermsGrid                        1/um  frequencies of the terms
+ *   reach_x  int                              1     coefficients on either side of the anchor, along x
+ *   reach_y  int                              1     and along y
+ *   pairs    double4[pairs]                   1/um  fx, fy; s H in radians; fourth unused
+ *   power    double[pairs]                    1     result: |P|^2, 1 of a mirror at f = 0
  *
- * Given at launch: reach_x and reach_y. Set by the host: BLOCKS of 8 terms; MOST_TAPS, which bounds 2 reach + 1.
+ * sinc_power
+ *   terms    float[rows][columns][2][DOUBLES * BLOCKS]   1   as of gaussian_power
+ *   extrema  double[2][2][DOUBLES * BLOCKS]   1     as of gaussian_power
+ *   grid     TermsGrid                        1/um  as of gaussian_power
+ *   reach_x  int                              1     as of gaussian_power
+ *   reach_y  int                              1     as of gaussian_power
+ *   pairs    double4[pairs]                   1/um  as of gaussian_power
+ *   power    double[pairs]                    1     result: |P|^2
+ *
+ * Set by the host: BLOCKS of DOUBLES terms; MOST_TAPS, which bounds 2 reach + 1.
  */
 
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-#define UNROLL _Pragma("unroll")
+#include "common.cl"
+#define CELL (PARTS * DOUBLES * BLOCKS) /* floats of a coefficient, all terms */
+#define SAME 1e-12 /* spacings: nearer than this, sin(pi d) / (pi d) is 1 to the rounding of double */
 
 typedef struct {
     double dfx, dfy;          /* spacing of the DFT's frequencies, 1/um */
     double sigma_x, sigma_y;  /* sigma_f of the window's transform in those spacings */
-    int columns, row_zero, column_zero;
-} Grid;
+    int columns;              /* of the terms */
+    int row_zero, column_zero; /* of f = 0 */
+} TermsGrid;
 
 /* exp(-d^2 / (2 sigma_f^2)) at the neighbours of `position`, both in spacings */
 static void gaussian(const double position, const double sigma, const int reach, double *weight) {
@@ -38,17 +54,12 @@ static void sinc(const double position, const int reach, double *weight) {
     double sine = sinpi(first);
     for (int i = 0; i <= 2 * reach; ++i, sine = -sine) {
         const double d = first + i;
-        weight[i] = fabs(d) < 1e-12 ? 1.0 : sine / (M_PI * d);
+        weight[i] = fabs(d) < SAME ? 1.0 : sine / (M_PI * d);
     }
 }
 
-static double total(const double8 x) {
-    const double4 half_sum = x.lo + x.hi;
-    return (half_sum.x + half_sum.y) + (half_sum.z + half_sum.w);
-}
-
 /* |sum_n (s H)^n / n! F_n|^2 with the weights of both axes */
-static double taylor_power(__global const float *terms, __global const double *extrema, const Grid grid,
+static double taylor_power(__global const float *terms, __global const double *extrema, const TermsGrid grid,
                            const int reach_x, const int reach_y, const double4 pair, const double *along_x,
                            const double *along_y) {
     const int first_row = (int)floor(pair.y / grid.dfy) - reach_y + grid.row_zero;
@@ -60,10 +71,10 @@ static double taylor_power(__global const float *terms, __global const double *e
     }
     double weights = 0.0;
     for (int t = 0; t <= 2 * reach_y; ++t) {
-        __global const float *row = terms + ((long)(first_row + t) * grid.columns + first_column) * 16 * BLOCKS;
+        __global const float *row = terms + ((long)(first_row + t) * grid.columns + first_column) * CELL;
         for (int s = 0; s <= 2 * reach_x; ++s) {
             const double weight = along_x[s] * along_y[t];
-            __global const float *cell = row + (long)s * 16 * BLOCKS;
+            __global const float *cell = row + (long)s * CELL;
             weights += weight;
             UNROLL for (int b = 0; b < BLOCKS; ++b) {
                 re[b] = fma((double8)weight, convert_double8(vload8(b, cell)), re[b]);
@@ -72,9 +83,9 @@ static double taylor_power(__global const float *terms, __global const double *e
         }
     }
 
-    double series[8 * BLOCKS];
+    double series[DOUBLES * BLOCKS];
     series[0] = 1.0;
-    for (int n = 1; n < 8 * BLOCKS; ++n) series[n] = series[n - 1] * pair.z / n;
+    for (int n = 1; n < DOUBLES * BLOCKS; ++n) series[n] = series[n - 1] * pair.z / n;
     /* D = least + range * stored at every neighbour: their weighed sum takes both once */
     double8 sum_re = 0.0, sum_im = 0.0;
     UNROLL for (int b = 0; b < BLOCKS; ++b) {
@@ -86,8 +97,7 @@ static double taylor_power(__global const float *terms, __global const double *e
     return p_re * p_re + p_im * p_im;
 }
 
-/* Single 2014, alg. 3: the window's transform at the neighbours' distances */
-__kernel void gaussian_power(__global const float *terms, __global const double *extrema, const Grid grid,
+__kernel void gaussian_power(__global const float *terms, __global const double *extrema, const TermsGrid grid,
                              const int reach_x, const int reach_y, __global const double4 *pairs,
                              __global double *power) {
     const double4 pair = pairs[get_global_id(0)];
@@ -97,8 +107,7 @@ __kernel void gaussian_power(__global const float *terms, __global const double 
     power[get_global_id(0)] = taylor_power(terms, extrema, grid, reach_x, reach_y, pair, along_x, along_y);
 }
 
-/* Single 2014, 1.5.3: the transform of one patch between its DFT coefficients */
-__kernel void sinc_power(__global const float *terms, __global const double *extrema, const Grid grid,
+__kernel void sinc_power(__global const float *terms, __global const double *extrema, const TermsGrid grid,
                          const int reach_x, const int reach_y, __global const double4 *pairs,
                          __global double *power) {
     const double4 pair = pairs[get_global_id(0)];

@@ -1,6 +1,6 @@
 """From a stack in memory to one on the device, faults told as this project tells them."""
 
-from kernels import device, windowed_dft
+from kernels import source, windowed_dft
 from pipeline.diffraction.device import require_device
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
@@ -22,5 +22,5 @@ def upload(built: Stack) -> windowed_dft.DeviceStack:
 
 
 def kernel_digest(*names: str) -> str:
-    """Digest of the sources of kernels, by their files' names."""
-    return digest.of_json([device.source(name) for name in names])
+    """Return the digest of kernels' sources, by their files' names, with what these include."""
+    return digest.of_json(source.text(*names))

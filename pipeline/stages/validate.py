@@ -21,7 +21,7 @@ REPORT = "report.html"
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernel": kernel_digest("exact_power.cl"),
+        "kernel": kernel_digest("dft_stack.cl", "exact_power.cl"),
         "name": config.name,
         "material": material_parameters(config),
         "spectrum": light_parameters(config),

@@ -10,7 +10,7 @@ from unittest import mock
 import pyopencl
 import pytest
 
-from kernels import device
+from kernels import device, source
 from tests.cli.tool import REPOSITORY, Tool
 
 NO_DEVICE = {"DIFFRACT_BAKE_DEVICE": "nonsense"}
@@ -79,7 +79,7 @@ def test_a_device_without_a_context_is_a_fault_and_no_traceback() -> None:
 
 
 def test_errors_of_the_compiler_come_through() -> None:
-    broken = mock.patch.object(device, "source", return_value="__kernel void broken() { undeclared = 1; }")
+    broken = mock.patch.object(source, "text", return_value="__kernel void broken() { undeclared = 1; }")
     with broken, pytest.raises(pyopencl.Error, match="undeclared"):
         device.Program(("broken.cl",), {})
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from kernels import device
+from kernels import device, peak, source
 from pipeline.accuracy.checks import relative_error
 from pipeline.config.models import Config
 from pipeline.evaluation import plain_numpy
@@ -156,13 +156,13 @@ def test_a_peak_is_the_kernels_operations_over_its_shortest_launch(
         launch(self, kernel, size, steps, buffer)
 
     monkeypatch.setattr(device.Program, "launch", note)
-    with device.timing() as launches:
-        peak = device.measure_peak(precision, 0.1)
+    with device.default_device().timing() as launches:
+        flops = peak.measure_peak(precision, 0.1)
     items, steps, buffer = launched[-1]
-    chains = device.source("peak.cl").count("= fma(")
+    chains = source.read("peak.cl").count("= fma(")
     # the first compiles; a listener's own stopwatch stops a little later
     shortest = min(each.seconds for each in launches[1:])
-    assert peak == pytest.approx(2 * chains * lanes * steps * items / shortest, rel=0.05)
+    assert flops == pytest.approx(2 * chains * lanes * steps * items / shortest, rel=0.05)
     # x = 0.999 x + 0.001 n comes to n, in every lane of every chain, and not before some thousand steps
     found = device.download(buffer, np.empty(items, real))
     np.testing.assert_allclose(found, chains * lanes * np.arange(items), rtol=1e-3, atol=1e-3)
@@ -170,8 +170,8 @@ def test_a_peak_is_the_kernels_operations_over_its_shortest_launch(
 
 def test_bandwidth_is_three_arrays_over_the_shortest_launch() -> None:
     """Beside numpy's own copy, which reads one array and writes one: neither is far from what memory allows."""
-    with device.timing() as launches:
-        bandwidth = device.measure_bandwidth(0.3)
+    with device.default_device().timing() as launches:
+        bandwidth = peak.measure_bandwidth(0.3)
     shortest = min(each.seconds for each in launches[1:])
     ones = np.ones(round(bandwidth * shortest / 3.0), np.uint8)
     out = np.empty_like(ones)
@@ -180,11 +180,11 @@ def test_bandwidth_is_three_arrays_over_the_shortest_launch() -> None:
 
 
 def test_launches_are_heard_only_while_one_listens() -> None:
-    with device.timing() as outer:
-        with device.timing() as inner:
-            device.measure_peak("single", 0.001)
+    with device.default_device().timing() as outer:
+        with device.default_device().timing() as inner:
+            peak.measure_peak("single", 0.001)
         heard = len(inner)
-        device.measure_peak("single", 0.001)
+        peak.measure_peak("single", 0.001)
     assert {launch.kernel for launch in outer} == {"peak"}
     assert 0 < heard == len(inner) < len(outer)
 

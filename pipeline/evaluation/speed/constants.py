@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from kernels import blocks
+from kernels.blocks import OTHERS
+from kernels.device import default_device
 from pipeline.evaluation.speed import polar_bake
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.progress import Progress, silent
@@ -32,9 +33,9 @@ def measure(setting: Setting, repeats: int, progress: Progress = silent) -> list
 
     repeats: bakes for each value, of which the fastest launch of each kernel counts.
     """
-    found = []
+    blocks, found = default_device().blocks, []
     for done, (name, kernels) in enumerate(_KERNELS.items(), 1):
-        value, other = blocks.chosen(name)[name], blocks.OTHERS[name]
+        value, other = blocks.chosen(name)[name], OTHERS[name]
         with blocks.instead(**{name: other}):
             other_s = _seconds(setting, repeats, kernels)
         found.append(Constant(name, value, _seconds(setting, repeats, kernels), other, other_s))

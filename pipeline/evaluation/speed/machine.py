@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from kernels import device
+from kernels import device, peak
 
 Precision = Literal["single", "double"]
 
@@ -26,8 +26,8 @@ class Machine:
 def measure() -> Machine:
     """Measure peaks and bandwidth of the default device."""
     used = device.default_device()
-    peaks = device.measure_peak("single"), device.measure_peak("double")
-    return Machine(used.name, used.compute_units, *peaks, device.measure_bandwidth())
+    peaks = peak.measure_peak("single"), peak.measure_peak("double")
+    return Machine(used.name, used.compute_units, *peaks, peak.measure_bandwidth())
 
 
 def best(first: Machine, second: Machine) -> Machine:

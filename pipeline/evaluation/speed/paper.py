@@ -60,7 +60,7 @@ class Paper:
 
     def table(self, resolution: int, step_nm: float) -> PaperTable:
         quadrature = self._quadrature(step_nm)
-        with device.timing() as launches:
+        with device.default_device().timing() as launches:
             table, seconds = timed(lambda: taylor.build(self._stack, quadrature, resolution, POWER))
         return PaperTable(table, quadrature, self._stack_s + seconds, sum(launch.seconds for launch in launches))
 

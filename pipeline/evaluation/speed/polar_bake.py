@@ -49,7 +49,7 @@ class TimedBake:
 def bake(setting: Setting, repeats: int) -> TimedBake:
     """Bake a table `repeats` times after one more that warms up."""
     setting.table(setting.power_spectrum(setting.stack()), setting.light)
-    with device.timing() as launches:
+    with device.default_device().timing() as launches:
         runs = [_once(setting) for _ in range(repeats)]
     built, made, table, _ = runs[-1]
     best = min((stages for *_, stages in runs), key=lambda stages: stages.total)

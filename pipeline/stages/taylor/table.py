@@ -24,7 +24,7 @@ _FILE = "table.zarr"
 
 def _parameters(config: Config) -> dict[str, Any]:
     return {
-        "kernel": kernel_digest("windowed_dft.cl", "taylor_table.cl", "exact_power.cl"),
+        "kernel": kernel_digest("taylor_table.cl", "dft_stack.cl", "exact_power.cl"),
         "spectrum": light_parameters(config),
         # the certificate is over colours, so all of the material counts
         "material": material_parameters(config),

@@ -1,0 +1,54 @@
+"""Memory behind the arrays that kernels read and write."""
+
+import threading
+from typing import Any
+
+import numpy as np
+
+LINE = 64  # bytes of a cache line, and of a vector
+_MOST_SPARE_BYTES = 2**28
+
+
+class MemoryPool:
+    """Arrays on memory that served before: page faults on fresh memory cost as much as a kernel's work."""
+
+    def __init__(self) -> None:
+        self._spare: list[np.ndarray] = []
+        # collecting garbage may free pages while pages are being taken
+        self._lock = threading.RLock()
+
+    def empty(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+        """Return an array that begins on a cache line: elsewhere every vector that a kernel loads would touch two.
+
+        Its memory returns to the pool once nothing refers to it.
+        """
+        bytes_ = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+        raw = np.asarray(_Pages(self, bytes_ + LINE))
+        first = -raw.ctypes.data % LINE
+        array: np.ndarray = raw[first : first + bytes_].view(dtype).reshape(shape)
+        return array
+
+    def take(self, bytes_: int) -> np.ndarray:
+        """Return spare memory of `bytes_` to twice that, or else new memory of `bytes_`."""
+        with self._lock:
+            fitting = (i for i, spare in enumerate(self._spare) if bytes_ <= spare.nbytes <= 2 * bytes_)
+            i = next(fitting, None)
+            return np.empty(bytes_, np.uint8) if i is None else self._spare.pop(i)
+
+    def give(self, memory: np.ndarray) -> None:
+        """Keep memory for later; the oldest goes where the pool holds too much."""
+        with self._lock:
+            self._spare.append(memory)
+            while sum(spare.nbytes for spare in self._spare) > _MOST_SPARE_BYTES:
+                self._spare.pop(0)
+
+
+class _Pages:
+    """What arrays hold of the pool's memory, until the last of them is gone."""
+
+    def __init__(self, pool: MemoryPool, bytes_: int) -> None:
+        self._pool, self._memory = pool, pool.take(bytes_)
+        self.__array_interface__ = {**self._memory.__array_interface__, "shape": (bytes_,)}
+
+    def __del__(self) -> None:
+        self._pool.give(self._memory)

@@ -1,0 +1,50 @@
+"""What a device can do at most, measured: arithmetic and memory bandwidth."""
+
+import time
+from typing import Any, Literal
+
+import numpy as np
+
+from kernels import device
+from kernels.device import Program
+
+_TRIAD_BYTES = 2**27  # of each of three arrays: more than last caches hold
+_VECTORS = 256  # of a work-item of the triad
+_VECTOR_BYTES = 64
+_STEPS = 20_000  # of the chains of multiply-adds
+_ITEMS_A_UNIT = 64
+_FLOPS_A_LANE = 16.0  # of a step: eight multiply-adds
+
+
+def measure_peak(precision: Literal["single", "double"], seconds: float = 0.5) -> float:
+    """Return operations a second of the device, by chains of fused multiply-adds on whole vectors of 64 bytes."""
+    real, size = {"single": ("float", 4), "double": ("double", 8)}[precision]
+    lanes = _VECTOR_BYTES // size
+    built = device.program(("peak.cl",), {"REAL": real, "LANES": lanes})
+    items = _ITEMS_A_UNIT * device.default_device().compute_units
+    buffer = device.result_buffer(size * items)
+    best = _shortest(built, "peak", (items,), (np.int32(_STEPS), buffer), seconds)
+    return items * _STEPS * _FLOPS_A_LANE * lanes / best
+
+
+def measure_bandwidth(seconds: float = 0.5) -> float:
+    """Return bytes a second between device and memory, by McCalpin's triad: two arrays read, one written."""
+    ones = np.ones(_TRIAD_BYTES // 4, np.float32)
+    a, b, out = device.upload(ones), device.upload(ones), device.result_buffer(_TRIAD_BYTES)
+    built = device.program(("bandwidth.cl",), {"VECTORS": _VECTORS})
+    items = _TRIAD_BYTES // (_VECTOR_BYTES * _VECTORS)
+    return 3.0 * _TRIAD_BYTES / _shortest(built, "triad", (items,), (a, b, np.float32(3.0), out), seconds)
+
+
+def _shortest(
+    built: Program, kernel: str, size: tuple[int, ...], arguments: tuple[Any, ...], seconds: float
+) -> float:
+    """Return the shortest of all launches that fit into `seconds`, s."""
+    # the first compiles, and touches every page
+    built.launch(kernel, size, *arguments)
+    best, until = float("inf"), time.perf_counter() + seconds
+    while time.perf_counter() < until:
+        with built.device.timing() as launches:
+            built.launch(kernel, size, *arguments)
+        best = min(best, launches[0].seconds)
+    return best
