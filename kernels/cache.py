@@ -12,7 +12,7 @@ from filelock import FileLock
 
 
 class KernelCache:
-    """PoCL's kernels on disk, with marks of what was compiled, and who is told before something is."""
+    """PoCL's kernels on disk, with marks of what was compiled, and who is notified before something is."""
 
     def __init__(self) -> None:
         self._listeners: list[Callable[[], None]] = []

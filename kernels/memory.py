@@ -44,7 +44,7 @@ class MemoryPool:
 
 
 class _Pages:
-    """What arrays hold of the pool's memory, until the last of them is gone."""
+    """A part of the pool's memory, held until the last array on it is gone."""
 
     def __init__(self, pool: MemoryPool, bytes_: int) -> None:
         self._pool, self._memory = pool, pool.take(bytes_)

@@ -1,4 +1,4 @@
-"""What a device can do at most, measured: arithmetic and memory bandwidth."""
+"""Peak arithmetic and memory bandwidth of the device, measured."""
 
 import time
 from typing import Any, Literal

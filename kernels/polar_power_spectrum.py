@@ -9,7 +9,7 @@ LANES = 16  # azimuths of a tile: floats in one vector
 
 
 def gather(stack: DeviceStack, radius_per_um: np.ndarray, azimuth_rad: np.ndarray, series: np.ndarray) -> np.ndarray:
-    """E float32 (tiles, radii, s nodes, 16) from a float32 Chebyshev stack; 0 beyond the scan's band.
+    """E float32 (tiles, radii, s nodes, 16) from a float32 Chebyshev stack; 0 beyond the scan's Nyquist limits.
 
     `radius_per_um` (radii,) ascends from 0; `azimuth_rad` is half a turn, a multiple of 16 azimuths: the other half
     follows it in E, tile by tile. `series` (terms, s nodes) holds (2 - [n = 0]) J_n(s H).

@@ -108,7 +108,7 @@ def taylor_table(
 def line_order(uvw: np.ndarray) -> np.ndarray:
     """Indices (directions,) that sort directions into lines of one v, u ascending, for `exact_power`.
 
-    `uvw` (directions, 3). Those with u < 0 stand where (-u, -v) does, from whose frequency they are served.
+    `uvw` (directions, 3). Those with u < 0 are placed as (-u, -v), whose frequency serves them.
     """
     u, v = (_turn(uvw)[:, None] * uvw[:, :2]).T
     return np.lexsort((u, v))
@@ -131,7 +131,7 @@ def _lines(uvw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def exact_power(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:
-    """|P|^2 (directions, L) from a Chebyshev stack; NaN beyond the scan's band.
+    """|P|^2 (directions, L) from a Chebyshev stack; NaN beyond the scan's Nyquist limits.
 
     `uvw` (directions, 3), `lambda_um` (L,). Directions of equal v are cheaper together than apart: a map's rows, five
     times. One launch: callers choose how many directions they hold at once, and hand over maps in `line_order`.

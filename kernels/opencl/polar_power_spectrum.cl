@@ -134,8 +134,8 @@ static APART void place_window(const Grid grid, __global const float *decay, __g
 }
 
 /* F_n at one azimuth of a tile, zero beyond the Nyquist limits: f_n[part][blocks * LANES vectors][lane = azimuth]. */
-static APART void gather_azimuth(__global const float *stack, const int columns, const int blocks, const int taps_x,
-                                 const int taps_y, const Window *window, const int lane, float16 *f_n) {
+static INLINE void gather_azimuth(__global const float *stack, const int columns, const int blocks, const int taps_x,
+                                  const int taps_y, const Window *window, const int lane, float16 *f_n) {
     if (!((const int *)&window->known)[lane]) {
         ROLLED for (int b = 0; b < PARTS * blocks; ++b) f_n[LANES * b + lane] = 0.0f;
         return;
@@ -154,10 +154,18 @@ static APART void gather_azimuth(__global const float *stack, const int columns,
     }
 }
 
+/* F_n of all azimuths of a tile: f_n[part][term][azimuth]. */
+static APART void gather_tile(__global const float *stack, const int columns, const int blocks, const int taps_x,
+                              const int taps_y, const Window *window, float16 *f_n) {
+    ROLLED for (int lane = 0; lane < LANES; ++lane)
+        gather_azimuth(stack, columns, blocks, taps_x, taps_y, window, lane, f_n);
+    ROLLED for (int block = 0; block < PARTS * blocks; ++block) transpose(f_n + LANES * block);
+}
+
 /* E at one node in s from F_n, re and im [terms][azimuths]; `opposite` takes those of the opposite azimuths. */
-static APART void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms,
-                                const int s_nodes, __global const float *series, __global float *here,
-                                __global float *opposite) {
+static INLINE void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms,
+                                 const int s_nodes, __global const float *series, __global float *here,
+                                 __global float *opposite) {
     float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
     ROLLED for (int n = 0; n < terms; n += 2) {
         const float16 even = series[n * s_nodes], odd = series[(n + 1) * s_nodes];
@@ -173,6 +181,14 @@ static APART void power_at_node(const float16 *re, const float16 *im, const int1
     STORE(select(minus, plus, turned), opposite);
 }
 
+/* E of a tile at every node in s. */
+static APART void power_at_nodes(const float16 *re, const float16 *im, const int16 turned, const int terms,
+                                 const int s_nodes, __global const float *series, __global float *here,
+                                 __global float *opposite) {
+    ROLLED for (int j = 0; j < s_nodes; ++j)
+        power_at_node(re, im, turned, terms, s_nodes, series + j, here + LANES * j, opposite + LANES * j);
+}
+
 __kernel void polar_power_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
                                    __global const double *radius, const int radii, __global const double *azimuth,
                                    __global const float *series, const int terms, const int blocks, const int s_nodes,
@@ -186,10 +202,6 @@ __kernel void polar_power_spectrum(__global const float *stack, __global const f
     place_window(grid, decay, azimuth + 2 * LANES * tile, radius[ring], fx_max, fy_max, reach_x, reach_y, &window);
     /* terms are gathered side by side, and used with azimuths side by side */
     float16 f_n[PARTS * MOST_BLOCKS * LANES];
-    ROLLED for (int lane = 0; lane < LANES; ++lane)
-        gather_azimuth(stack, grid.columns, blocks, 2 * reach_x + 1, 2 * reach_y + 1, &window, lane, f_n);
-    ROLLED for (int block = 0; block < PARTS * blocks; ++block) transpose(f_n + LANES * block);
-    ROLLED for (int j = 0; j < s_nodes; ++j)
-        power_at_node(f_n, f_n + LANES * blocks, window.turned, terms, s_nodes, series + j, here + LANES * j,
-                      opposite + LANES * j);
+    gather_tile(stack, grid.columns, blocks, 2 * reach_x + 1, 2 * reach_y + 1, &window, f_n);
+    power_at_nodes(f_n, f_n + LANES * blocks, window.turned, terms, s_nodes, series, here, opposite);
 }

@@ -1,7 +1,7 @@
 /* Spectral integration as a linear operator from E(r, s) to a ring of the polar table, the same for every azimuth.
  * docs/spectral_operator.md derives it, with a drawing of the (r, s) plane.
  *
- *   I(rho, phi, w) = sum_l weights[l] E(rho / l, phi, 2 pi |w| / l)   in X, Y, Z (docs/conventions.md, without C cos ti)
+ *   I(rho, phi, w) = sum_l weights[l] E(rho / l, phi, 2 pi |w| / l)   in X, Y, Z (docs/conventions.md, less C cos ti)
  *   E(r, s)        = sum_(a, j) L_a(r) C_j(s) E(r_a, s_j)             L Lagrange's polynomials on ORDER radii about r,
  *                                                                     C cardinal functions of Chebyshev nodes
  *   I(rho, phi, w) = sum_k T_k(2 |w| / w_max - 1) table[k],  w_max = sqrt(4 - rho^2)
