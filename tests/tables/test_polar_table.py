@@ -1,4 +1,4 @@
-"""Where the texels of a polar table lie, and what splines between them keep."""
+"""The polar table: B-splines between texels, its rim, and the lobe of a mirror in closed form."""
 
 import numpy as np
 import pytest
@@ -6,41 +6,12 @@ from scipy.ndimage import spline_filter1d
 
 from kernels import cubic_spline
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.optics.light import Light, trapezoid
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.table import PolarTable
-
-GRIDS = [Azimuths(64), Azimuths(96, 0.4, 0.3), Azimuths(32, 0.7, -1.5)]
-
-
-@pytest.mark.parametrize("azimuths", GRIDS)
-def test_an_azimuth_is_its_own_index(azimuths: Azimuths) -> None:
-    angles = azimuths.angles()
-    uv = 0.7 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    apart = (azimuths.index(uv) - np.arange(azimuths.count) + 0.5 * azimuths.count) % azimuths.count
-    np.testing.assert_allclose(apart, 0.5 * azimuths.count, atol=1e-9)
-
-
-@pytest.mark.parametrize("azimuths", GRIDS)
-def test_half_a_turn_is_half_the_azimuths_whatever_the_stretch(azimuths: Azimuths) -> None:
-    angles, half = azimuths.angles(), azimuths.count // 2
-    turned = (angles[half:] - angles[:half]) % (2.0 * np.pi)
-    np.testing.assert_allclose(turned, np.pi, atol=1e-12)
-
-
-def test_stretched_azimuths_crowd_about_their_axis() -> None:
-    angles = Azimuths(128, 0.25, np.radians(30.0)).angles()
-    gap = np.abs(np.angle(np.exp(1j * (np.roll(angles, -1) - angles))))
-    at_axis, across = (np.argmin(np.abs(np.angle(np.exp(1j * (angles - np.radians(d)))))) for d in (30.0, 120.0))
-    assert gap[across] / gap[at_axis] == pytest.approx(16.0, rel=0.1)
-
-
-def test_rings_run_from_zero_to_the_rim_and_are_their_own_index() -> None:
-    rings = Rings(50, 0.1, 1.7)
-    rho = rings.rho()
-    assert (rho[0], rho[-1]) == (0.0, 1.7)
-    np.testing.assert_allclose(rings.index(rho), np.arange(50), atol=1e-9)
-    # even at first, by ratios at last
-    assert (rho[2] - rho[1]) / rho[1] == pytest.approx(1.0, rel=0.02)
-    assert (rho[-1] / rho[-2]) == pytest.approx(rho[-2] / rho[-3], rel=1e-3)
+from tests.diffraction.fields import SIGMA, spectrum_of
 
 
 def test_spline_coefficients_are_those_of_an_independent_filter() -> None:
@@ -103,3 +74,17 @@ def test_the_rim_and_vanishing_w_are_ordinary() -> None:
     found = table.look_up(uvw)
     assert np.all(np.isfinite(found))
     np.testing.assert_allclose(found[:, 0], 1.0, rtol=1e-5)
+
+
+def test_a_mirror_keeps_its_lobe() -> None:
+    """|P|^2 = exp(-(rho / lambda)^2 / sigma_f^2) at every w: the whole table in closed form."""
+    field = HeightField(np.full((100, 100), 3.0), (0.15, 0.15))
+    power = spectrum_of(field, Azimuths(32))
+    rings, rule = Rings(120, 0.1), trapezoid(Light(), 5.0)
+    table = polar.build(
+        power, rings, quadrature.uniform(rule, 120), 4, lambda nm, cos: np.ones((*cos.shape, len(nm)))
+    )
+    rho, phi = np.linspace(0.0, 0.3, 40), np.linspace(0.0, 6.0, 40)
+    uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
+    lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)
+    np.testing.assert_allclose(table.look_up(uvw), lobe @ rule.weights, atol=3e-5)

@@ -1,0 +1,42 @@
+"""The polar power spectrum E(r, phi, s) against sums over samples."""
+
+import numpy as np
+import pytest
+
+from pipeline.diffraction.polar_grid import Azimuths
+from pipeline.diffraction.reference import power_direct
+from tests.diffraction.fields import SIGMA, rough, spectrum_of
+
+
+@pytest.mark.parametrize("height", [0.0, 0.1, 0.6])
+def test_every_node_is_the_sum_over_samples(height: float) -> None:
+    """Both half turns, one vector of terms and several, and zero where the scan knows nothing."""
+    field, azimuths = rough(height=height), Azimuths(64, 0.6, 0.3)
+    power = spectrum_of(field, azimuths)
+    rng = np.random.default_rng(0)
+    tile, ring, node, lane = (rng.integers(n, size=150) for n in power.values.shape)
+    r, phi = power.radius_per_um[ring], azimuths.angles()[16 * tile + lane]
+    # at 1 um, (u, v) is the frequency and |w| = s / (2 pi)
+    uvw = np.stack([r * np.cos(phi), r * np.sin(phi), -power.s_per_um[node] / (2.0 * np.pi)], axis=-1)
+    expected = power_direct(field, SIGMA, uvw, 1000.0)
+    found = power.values[tile, ring, node, lane]
+    unknown = np.isnan(expected)
+    assert np.all(found[unknown] == 0.0)
+    level = np.mean(expected[~unknown])
+    np.testing.assert_allclose(found[~unknown], expected[~unknown], rtol=1e-4, atol=2e-4 * level)
+
+
+def test_what_the_scan_does_not_know_is_zero() -> None:
+    field = rough(pitch=(0.2, 0.2))
+    power = spectrum_of(field, Azimuths(32))
+    r, phi = power.radius_per_um, power.azimuths.angles()[0]
+    assert phi == 0.0
+    np.testing.assert_array_equal(power.values[0, :, :, 0].max(axis=1) == 0.0, r > 2.5)
+
+
+def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
+    field = rough()
+    fine, coarse = (spectrum_of(field, Azimuths(n, 0.7, 0.1)) for n in (128, 64))
+    thinned = fine.thinned(2)
+    assert thinned.azimuths == coarse.azimuths
+    np.testing.assert_allclose(thinned.values, coarse.values, rtol=1e-4, atol=1e-7)
