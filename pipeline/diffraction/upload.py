@@ -1,10 +1,9 @@
 """From a stack in memory to one on the device, faults told as this project tells them."""
 
-from kernels import device, diffraction
+from kernels import diffraction
 from pipeline.diffraction.device import require_device
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
-from pipeline.store import digest
 
 
 def upload(built: Stack) -> diffraction.DeviceStack:
@@ -19,8 +18,3 @@ def upload(built: Stack) -> diffraction.DeviceStack:
         built.half_range_um,
         built.band_per_um,
     )
-
-
-def kernel_digest(*names: str) -> str:
-    """Digest of the sources of kernels, by their files' names."""
-    return digest.of_json([device.source(name) for name in names])

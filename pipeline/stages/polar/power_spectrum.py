@@ -11,10 +11,9 @@ from kernels import device
 from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
-from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.surface import windows
