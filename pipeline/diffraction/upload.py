@@ -1,4 +1,4 @@
-"""From a stack in memory to one on the device, faults told as this project tells them."""
+"""The transfer of a DFT stack to the device."""
 
 from kernels import diffraction
 from pipeline.diffraction.device import require_device
@@ -7,7 +7,7 @@ from pipeline.optics.coherence import sigma_f
 
 
 def upload(built: Stack) -> diffraction.DeviceStack:
-    """The stack on the default device. Raises DeviceError where none works."""
+    """Copies a stack to the default device. Raises DeviceError if no device works."""
     require_device()
     return diffraction.upload_stack(
         built.coefficients,

@@ -15,7 +15,7 @@ def test_every_node_is_the_sum_over_samples(height: float) -> None:
     power = spectrum_of(field, azimuths)
     rng = np.random.default_rng(0)
     tile, ring, node, lane = (rng.integers(n, size=150) for n in power.values.shape)
-    r, phi = power.radius_per_um[ring], azimuths.angles()[16 * tile + lane]
+    r, phi = power.radius_per_um[ring], azimuths.phi()[16 * tile + lane]
     # at 1 um, (u, v) is the frequency and |w| = s / (2 pi)
     uvw = np.stack([r * np.cos(phi), r * np.sin(phi), -power.s_per_um[node] / (2.0 * np.pi)], axis=-1)
     expected = power_direct(field, SIGMA, uvw, 1000.0)
@@ -29,7 +29,7 @@ def test_every_node_is_the_sum_over_samples(height: float) -> None:
 def test_what_the_scan_does_not_know_is_zero() -> None:
     field = rough(pitch=(0.2, 0.2))
     power = spectrum_of(field, Azimuths(32))
-    r, phi = power.radius_per_um, power.azimuths.angles()[0]
+    r, phi = power.radius_per_um, power.azimuths.phi()[0]
     assert phi == 0.0
     np.testing.assert_array_equal(power.values[0, :, :, 0].max(axis=1) == 0.0, r > 2.5)
 

@@ -43,7 +43,7 @@ def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
         return trial.mean_power_spectrum(plan.choose(trial, None, budget, layout).azimuths, fields[1:])
 
     many, one = mean("auto"), mean("centre")
-    r, phi = many.radius_per_um[40], many.azimuths.angles()[5]
+    r, phi = many.radius_per_um[40], many.azimuths.phi()[5]
     uvw = np.array([[r * np.cos(phi), r * np.sin(phi), -many.s_per_um[3] / (2.0 * np.pi)]])
     places = windows.places(field, Coherence(sigma_um=SIGMA))
     assert len(places) == 9

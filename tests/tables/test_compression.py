@@ -58,7 +58,7 @@ def test_samples_are_what_coefficients_stand_for() -> None:
 def test_samples_are_the_look_up_at_the_nodes() -> None:
     values = noise(24, 12, 96).astype(np.float32)
     ring, azimuth = np.meshgrid(np.arange(24), np.arange(96), indexing="ij")
-    rho, phi = GRID.rings.rho()[ring].ravel(), GRID.azimuths.angles()[azimuth].ravel()
+    rho, phi = GRID.rings.rho()[ring].ravel(), GRID.azimuths.phi()[azimuth].ravel()
     # |w| = w_max makes every Chebyshev polynomial 1
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), -np.sqrt(4.0 - np.minimum(rho, 1.99999) ** 2)], axis=-1)
     found = PolarTable(values.reshape(24, 3, 4, 96), GRID).look_up(uvw)
@@ -98,7 +98,7 @@ def test_dim_texels_count_as_much_as_bright_ones() -> None:
 
 def smooth_table(fall: Array) -> PolarTable:
     """A table whose rings fall off as `fall` and that turns slowly with the azimuth."""
-    phi = GRID.azimuths.angles()
+    phi = GRID.azimuths.phi()
     turning = 2.0 + np.cos(2.0 * phi)[:, None] * np.sin(np.arange(3 * W_TERMS))
     made = cubic_spline.coefficients(np.ascontiguousarray(fall[:, None, None] * turning.T, dtype=np.float32))
     return PolarTable(made.reshape(24, 3, W_TERMS, 96), GRID)

@@ -27,7 +27,7 @@ def test_spline_coefficients_are_those_of_an_independent_filter() -> None:
 
 def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
     """A table that holds function(u, v) in X, twice it in Y and it times |w| / w_max in Z."""
-    rho, phi = rings.rho()[:, None], azimuths.angles()
+    rho, phi = rings.rho()[:, None], azimuths.phi()
     values = function(rho * np.cos(phi), rho * np.sin(phi))
     samples = np.zeros((rings.count, 12, azimuths.count), np.float32)
     samples[:, 0], samples[:, 4] = values, 2.0 * values

@@ -38,7 +38,7 @@ def integral_error(
     for share in (0.05, 0.5, 0.97):
         cosines = np.cos(np.arange(w_terms) * np.arccos(2.0 * share - 1.0))
         found = np.einsum("rcka,k->rac", terms, cosines)
-        phi = power.azimuths.angles()
+        phi = power.azimuths.phi()
         w = -share * np.sqrt(4.0 - RHO**2)
         uvw = np.stack(
             np.broadcast_arrays(RHO[:, None] * np.cos(phi), RHO[:, None] * np.sin(phi), w[:, None]), axis=-1

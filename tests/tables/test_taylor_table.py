@@ -159,5 +159,5 @@ def test_tall_surfaces_are_refused_with_the_error_and_the_remedy() -> None:
 
 
 def test_too_few_terms_are_refused() -> None:
-    with pytest.raises(AccuracyError, match=r'terms left out .*table.terms = "auto"'):
+    with pytest.raises(AccuracyError, match=r'truncation .*table.terms = "auto"'):
         expansion.plan_taylor(small(), trapezoid(Light(), 5.0), 1e-4, 5)

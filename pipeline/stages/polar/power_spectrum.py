@@ -67,7 +67,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {
             "E": arrays.Named(built.values, ("tile", "r", "s", "lane"), "1"),
             "phi": arrays.Named(
-                np.degrees(built.azimuths.angles()).reshape(-1, built.values.shape[3]), ("tile", "lane"), "degree"
+                np.degrees(built.azimuths.phi()).reshape(-1, built.values.shape[3]), ("tile", "lane"), "degree"
             ),
             "r": arrays.Named(built.radius_per_um, ("r",), "1/um"),
             "s": arrays.Named(built.s_per_um, ("s",), "1/um"),

@@ -49,7 +49,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {
             "table": arrays.Named(table.values, ("rho", "channel", "w_term", "phi"), "1"),
             "rho": arrays.Named(table.grid.rings.rho(), ("rho",), "1"),
-            "phi": arrays.Named(np.degrees(table.grid.azimuths.angles()), ("phi",), "degree"),
+            "phi": arrays.Named(np.degrees(table.grid.azimuths.phi()), ("phi",), "degree"),
             "wavelengths": arrays.Named(rules.count, ("rho",), "1"),
         },
         {

@@ -119,7 +119,7 @@ def _landings(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
     uvw = geometry.uvw(*random_pairs(scene, _DIRECTIONS, _SEED))
     rho = np.hypot(uvw[:, 0], uvw[:, 1])
     rings = table.grid.rings
-    nearest = np.clip(np.rint(rings.index(rho)).astype(int), 0, rings.count - 1)
+    nearest = np.clip(np.rint(rings.ring_from_rho(rho)).astype(int), 0, rings.count - 1)
     landed = np.bincount(nearest, minlength=rings.count).astype(np.float64)
     density = landed * (rings.count / len(rho)) + _LEAST_RING
     cosines = np.cos(np.arange(table.w_terms) * np.arccos(w_position(rho, uvw[:, 2]))[:, None])

@@ -46,7 +46,7 @@ def look_up(table: SpectralTable, uvw: Array, lambda_nm: Array) -> Array:
     shape = len(uvw), len(lambda_um)
     r = np.hypot(uvw[:, 0], uvw[:, 1])[:, None] / lambda_um
     s = 2.0 * np.pi * np.abs(uvw[:, 2])[:, None] / lambda_um
-    azimuth = np.broadcast_to(table.source.azimuths.index(uvw[:, :2])[:, None], shape)
+    azimuth = np.broadcast_to(table.source.azimuths.azimuth_from_uv(uvw[:, :2])[:, None], shape)
     flat = [np.ascontiguousarray(a).ravel() for a in (r, s, azimuth)]
     parts = [_at(table, *(a[first : first + _AT_ONCE] for a in flat)) for first in range(0, len(flat[0]), _AT_ONCE)]
     return np.concatenate(parts).reshape(shape)

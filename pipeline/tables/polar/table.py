@@ -43,10 +43,14 @@ class PolarTable:
         """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the grid's rings."""
         rings, azimuths = self.grid.rings, self.grid.azimuths
         rho = np.hypot(uvw[:, 0], uvw[:, 1])
-        ring = rings.index(rho)
+        ring = rings.ring_from_rho(rho)
         # rounding may carry a direction of the rim itself past the last ring
         inside = ring <= rings.count - 1 + 1e-6
-        place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
+        place = (
+            np.clip(ring, 0.0, rings.count - 1.0),
+            azimuths.azimuth_from_uv(uvw[:, :2]),
+            w_position(rho, uvw[:, 2]),
+        )
         flat = self.values.reshape(rings.count, -1, azimuths.count)
         found = cubic_spline.look_up(flat, *place).astype(np.float64)
         found[~inside] = np.nan
@@ -82,7 +86,7 @@ def w_position(rho: Array, w: Array) -> Array:
 
 def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quadrature) -> float:
     """Share of the light (Y weights), over the grid's disc, whose frequencies lie beyond the scan's band."""
-    rho, phi = grid.rings.rho(), grid.azimuths.angles()
+    rho, phi = grid.rings.rho(), grid.azimuths.phi()
     area = np.outer(rho * np.gradient(rho), np.abs(np.gradient(np.unwrap(phi))))
     # along each direction the band ends at r = reach, so all wavelengths shorter than rho / reach are lost
     reach = np.minimum(
