@@ -106,7 +106,7 @@ def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
     Returns the textures, with a constant envelope.
     """
     full, outputs = whole(table), CHANNELS * textures
-    density, gram = _landings(table, scene)
+    density, gram = _weights(table, scene)
     # |metric t|^2 is the visible error: in opponent channels, mean over |w|
     metric = np.kron(_OPPONENT, np.linalg.cholesky(gram).T)
     moments = sum(
@@ -127,7 +127,7 @@ def _unit_moments(texels: Array) -> Array:
     return np.asarray(unit @ unit.T)
 
 
-def _landings(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
+def _weights(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
     """Computes the weights of the rings (rings,) and the mean of T_k T_l (w terms, w terms) by random directions."""
     uvw = geometry.uvw(*random_pairs(scene, _DIRECTIONS, _SEED))
     rho = np.hypot(uvw[:, 0], uvw[:, 1])

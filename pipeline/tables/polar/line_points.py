@@ -49,8 +49,8 @@ class _Lines:
     ) -> None:
         self.rho, self.wavelengths, self._radius = rho, quadratures.count, radius_per_um
         self.low, self.high = quadratures.kappa_ends_per_um
-        self.first = _about(radius_per_um, rho * self.low)
-        self.last = _about(radius_per_um, rho * self.high) + ORDER - 1
+        self.first = _first_radius(radius_per_um, rho * self.low)
+        self.last = _first_radius(radius_per_um, rho * self.high) + ORDER - 1
         self._spacing = np.diff(radius_per_um)
         # d (s / s_max) / d kappa and d kappa / d r
         self._share_rate = 2.0 * pi * w_max(rho) / s_max_per_um
@@ -62,23 +62,25 @@ class _Lines:
         self.rate += self._share_rate * self._distances / _STEP_BETWEEN
         # a point between radii costs twice as much
         self.on_radii = (
-            (self.first >= 0) & self._followed(self.last) & (self.last + 1 - self.first <= 2 * self.wavelengths)
+            (self.first >= 0) & self._resolved(self.last) & (self.last + 1 - self.first <= 2 * self.wavelengths)
         )
         self.on_nodes = ~self.on_radii & (self.wavelengths <= _steps(self.low, self.high, self.rate)[0])
 
-    def _known(self, r: Array) -> NDArray[np.bool_]:
+    def _within_limit(self, r: Array) -> NDArray[np.bool_]:
         """Whether the lines up to r remain within the extrapolation limit in s."""
         return np.asarray(self._share_rate * self.kappa_rate * r <= self._end)
 
-    def _followed(self, radius: np.ndarray) -> NDArray[np.bool_]:
+    def _resolved(self, radius: np.ndarray) -> NDArray[np.bool_]:
         """Whether the radii of E up to index `radius` are close enough along the lines to be the points."""
         step = self._share_rate * self._distances * self.kappa_rate * self._spacing[radius - 1]
-        return np.asarray((step <= _STEP_ON_RADII) & self._known(self._radius[radius]))
+        return np.asarray((step <= _STEP_ON_RADII) & self._within_limit(self._radius[radius]))
 
     def joined_by(self, ring: np.ndarray) -> NDArray[np.bool_]:
         """Whether a later ring may share the line of each ring; ring: index of the later ring (n_rings,)."""
         reached = np.where(
-            self.on_radii, self._followed(self.last[ring]), self._known(self.rho[ring] * self.high[ring])
+            self.on_radii,
+            self._resolved(self.last[ring]),
+            self._within_limit(self.rho[ring] * self.high[ring]),
         )
         far = _LEAST_SHARE * self._share_rate * self.rho[ring] <= self._share_rate[ring] * self.rho
         alike = (self.on_radii[ring] == self.on_radii) & ~self.on_nodes[ring] & ~self.on_nodes
@@ -113,7 +115,7 @@ def choose(
     kappa, of_rho = high[group] - up * step[group], rho[leader][group]
     nodes, on = on_nodes[group], on_radii[group]
     kappa[nodes] = 1.0 / quadratures.lambda_um[(quadratures.first[leader][group] + up)[nodes]]
-    place = np.where(on, first[group] + i, _about(radius_per_um, of_rho * kappa))
+    place = np.where(on, first[group] + i, _first_radius(radius_per_um, of_rho * kappa))
     kappa[on] = radius_per_um[place[on]] / of_rho[on]
     return LinePoints(kappa, place, begin, count, rings, on_radii, on_nodes, stretch)
 
@@ -138,7 +140,7 @@ def _steps(low: Array, high: Array, rate: Array) -> tuple[np.ndarray, Array]:
     return np.maximum(ORDER, np.ceil((high - low) / step).astype(int) + 1), step
 
 
-def _about(radius_per_um: Array, r: Array) -> np.ndarray:
+def _first_radius(radius_per_um: Array, r: Array) -> np.ndarray:
     """Finds the first of the ORDER radii about r; negative near the origin, where radii are mirrored."""
     half = ORDER // 2
     below = np.searchsorted(radius_per_um, r, side="right") - 1

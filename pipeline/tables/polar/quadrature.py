@@ -41,7 +41,7 @@ def choose(
     white = integrand(FINE_STEP_NM)
     if len(white.lambda_nm) == 1:
         return uniform(white, len(rho))
-    steps = (_keeping(white, integrand(step)) for step in _STEPS_NM)
+    steps = (_scaled_to(white, integrand(step)) for step in _STEPS_NM)
     coarse = next(steps)
     x = np.linspace(0.0, _REACH_SIGMAS * sigma_um, _POINTS)
     share = np.exp(-0.5 * (x / sigma_um) ** 2)
@@ -65,7 +65,7 @@ def choose(
     )
 
 
-def _keeping(white: Quadrature, rule: Quadrature) -> Quadrature:
+def _scaled_to(white: Quadrature, rule: Quadrature) -> Quadrature:
     """Scales each channel of a quadrature to the integral that `white` gives."""
     found, asked = rule.weights.sum(axis=0), white.weights.sum(axis=0)
     # avoid 0 / 0 for a channel without weight

@@ -31,10 +31,10 @@ class TaylorLayout(Validated):
 
     @property
     def integral_step_nm(self) -> float | None:
-        """Step, nm, of the spectral integral."""
+        """Step of the spectral integral, nm."""
         return self.step_nm
 
     @property
     def mean_step_nm(self) -> float:
-        """Step, nm, of the means over wavelength that are taken outside the spectral integral: the integral's own."""
+        """Step of the means over wavelength outside the spectral integral, nm: that of the integral."""
         return self.step_nm
