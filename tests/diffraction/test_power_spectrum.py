@@ -5,14 +5,14 @@ import pytest
 
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import power_direct
-from tests.diffraction.fields import SIGMA, rough, spectrum_of
+from tests.diffraction.fields import SIGMA, power_spectrum_of, rough
 
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.6])
-def test_every_node_is_the_sum_over_samples(height: float) -> None:
-    """Both half turns, one vector of terms and several, and zero where the scan knows nothing."""
+def test_every_node_equals_the_sum_over_samples(height: float) -> None:
+    """In both half turns, for one vector of terms and for several; 0 beyond the Nyquist limits."""
     field, azimuths = rough(height=height), Azimuths(64, 0.6, 0.3)
-    power = spectrum_of(field, azimuths)
+    power = power_spectrum_of(field, azimuths)
     rng = np.random.default_rng(0)
     tile, ring, node, lane = (rng.integers(n, size=150) for n in power.values.shape)
     r, phi = power.radius_per_um[ring], azimuths.phi()[16 * tile + lane]
@@ -26,17 +26,17 @@ def test_every_node_is_the_sum_over_samples(height: float) -> None:
     np.testing.assert_allclose(found[~unknown], expected[~unknown], rtol=1e-4, atol=2e-4 * level)
 
 
-def test_what_the_scan_does_not_know_is_zero() -> None:
+def test_e_is_zero_beyond_the_nyquist_limit() -> None:
     field = rough(pitch=(0.2, 0.2))
-    power = spectrum_of(field, Azimuths(32))
+    power = power_spectrum_of(field, Azimuths(32))
     r, phi = power.radius_per_um, power.azimuths.phi()[0]
     assert phi == 0.0
     np.testing.assert_array_equal(power.values[0, :, :, 0].max(axis=1) == 0.0, r > 2.5)
 
 
-def test_thinned_azimuths_are_those_of_a_coarser_grid() -> None:
+def test_thinned_azimuths_equal_those_of_a_coarser_grid() -> None:
     field = rough()
-    fine, coarse = (spectrum_of(field, Azimuths(n, 0.7, 0.1)) for n in (128, 64))
+    fine, coarse = (power_spectrum_of(field, Azimuths(n, 0.7, 0.1)) for n in (128, 64))
     thinned = fine.thinned(2)
     assert thinned.azimuths == coarse.azimuths
     np.testing.assert_allclose(thinned.values, coarse.values, rtol=1e-4, atol=1e-7)

@@ -21,8 +21,7 @@ def rough(nx: int, ny: int) -> HeightField:
     return HeightField(np.random.default_rng(1).uniform(-0.08, 0.08, (ny, nx)), (0.1, 0.1))
 
 
-def test_the_reference_is_the_mean_of_its_windows() -> None:
-
+def test_the_reference_is_the_mean_over_windows() -> None:
     places = windows.places(rough(100, 60), Coherence(sigma_um=SIGMA))
     light = Light(illuminant=LaserLine(lambda_nm=550.0))
     wi, wr = np.array([[0.0, 0.0, 1.0]]), np.array([[0.6, 0.0, 0.8]])
@@ -33,7 +32,7 @@ def test_the_reference_is_the_mean_of_its_windows() -> None:
     np.testing.assert_allclose(found, np.mean(each, axis=0), rtol=1e-6)
 
 
-def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
+def test_e_is_the_mean_over_windows_and_its_speckle_has_less_contrast() -> None:
     field = rough(150, 150)
     layout, budget = PolarLayout(rings=20, azimuths=256), plan.Budget(0.5, 7500.0)
 
@@ -50,6 +49,6 @@ def test_e_is_the_mean_over_windows_and_its_speckle_fades() -> None:
     direct = np.mean([power_direct(place, SIGMA, uvw, 1000.0) for place in places])
     assert many.values[0, 40, 3, 5] == pytest.approx(direct, rel=2e-3)
     single, averaged = power_spectrum.speckle_contrast(one), power_spectrum.speckle_contrast(many)
-    # fully developed speckle has contrast 1; nine windows, two of three neighbours apart by half a width
+    # fully developed speckle has a contrast of 1; neighbours among the nine windows overlap by half a width
     assert single == pytest.approx(1.0, abs=0.15)
     assert 0.08 < averaged < 0.35

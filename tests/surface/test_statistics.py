@@ -215,7 +215,7 @@ def test_a_plane_steps_at_its_seams_by_its_whole_rise() -> None:
     assert s.seam_step_um == pytest.approx((9.9 * slopes[0], 5.9 * slopes[1]), rel=1e-9)
 
 
-def test_seams_hold_no_energy_of_a_periodic_surface_and_all_of_a_tilt() -> None:
+def test_seam_energy_is_none_for_a_periodic_surface_and_all_for_a_tilt() -> None:
     y, x = np.mgrid[0:64, 0:96] * 0.1
     periodic = np.cos(2.0 * np.pi * x / 3.2) * np.sin(2.0 * np.pi * y / 1.6)
     assert measure(HeightField(periodic, (0.1, 0.1)), 1.5, 380.0).seam_energy < 0.02

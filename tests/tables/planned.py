@@ -15,20 +15,24 @@ SIGMA = 2.0
 
 
 def config(**sections) -> Config:
+    """A config of a small artificial snake skin; sections replace those of the same name."""
     recipe = {"kind": "elaphe", "size_um": 12, "pitch_um": 0.1, "height_um": 0.3}
     document = {"name": "a", "surface": {"recipe": recipe}, "coherence": {"sigma_um": SIGMA}, **sections}
     return parse(document, "a.toml", Path())
 
 
 def field_of(found: Config) -> HeightField:
+    """The height field of a config's recipe."""
     return recipes.make(found.surface.recipe)
 
 
 def exact_of(found: Config) -> MeanReference:
+    """The reference of a config."""
     return reference_of(field_of(found), found)
 
 
 def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
+    """The table of a config and its plan."""
     budget = plan.Budget(found.budget_delta_e, found.accuracy.exposure_ru)
     sigma = found.coherence.sigma_um
     fields = windows.places(field_of(found), found.coherence)

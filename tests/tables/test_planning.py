@@ -20,7 +20,7 @@ def test_a_finer_budget_costs_more_texels_and_nodes() -> None:
     assert fine.s_nodes >= rough.s_nodes
 
 
-def test_what_is_set_is_kept() -> None:
+def test_numbers_that_a_config_sets_are_kept() -> None:
     found = config(table={"rings": 20, "azimuths": 160, "w_terms": 4, "terms": 20})
     table, chosen = planned(found)
     assert (chosen.rings.count, chosen.azimuths.count, chosen.w_terms) == (20, 160, 4)
@@ -29,7 +29,7 @@ def test_what_is_set_is_kept() -> None:
     assert table.values.shape == (20, 3, 4, 160)
 
 
-def test_one_axis_that_is_set_stays_while_the_other_is_searched() -> None:
+def test_one_number_is_kept_while_the_other_is_searched() -> None:
     _, chosen = planned(config(table={"rings": 36}, accuracy={"delta_e": 1.0}))
     assert chosen.rings.count == 36
     _, chosen = planned(config(table={"azimuths": 320}, accuracy={"delta_e": 1.0}))
@@ -37,7 +37,7 @@ def test_one_axis_that_is_set_stays_while_the_other_is_searched() -> None:
     assert chosen.probed_delta_e is not None
 
 
-def test_a_flat_mirror_is_planned_for_its_lobe() -> None:
+def test_the_plan_of_a_flat_mirror_keeps_its_budget() -> None:
     recipe = {"kind": "mirror", "size_um": 6.4, "pitch_um": 0.1}
     found = config(surface={"recipe": recipe}, coherence={"sigma_um": 1.6}, accuracy={"delta_e": 0.5})
     table, _ = planned(found)
@@ -56,7 +56,7 @@ def test_a_scene_bounds_the_rings() -> None:
     certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found)
 
 
-def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
+def test_the_stretch_follows_the_axis_of_a_grating() -> None:
     y, x = np.mgrid[-60:60, -60:60] * 0.1
     for angle in (0.0, 35.0, 90.0):
         along = x * np.cos(np.radians(angle)) + y * np.sin(np.radians(angle))
@@ -64,7 +64,7 @@ def test_the_axis_of_a_grating_is_found_at_any_angle() -> None:
         stretch, axis = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
         apart = np.angle(np.exp(2j * (axis - np.radians(angle)))) / 2.0
         assert abs(np.degrees(apart)) < 2.0
-        # seams of a turned grating scatter too
+        # the seams of a rotated grating scatter too
         assert stretch < 0.65
 
 

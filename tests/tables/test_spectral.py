@@ -6,13 +6,13 @@ from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import power_direct
 from pipeline.tables.polar import spectral
-from tests.diffraction.fields import SIGMA, rough, spectrum_of
+from tests.diffraction.fields import SIGMA, power_spectrum_of, rough
 
 
-def test_the_spectral_form_answers_every_wavelength_without_integration() -> None:
-    """Between all nodes, against sums over samples; the speckle's mean is what errors are held against."""
+def test_the_spectral_form_agrees_with_sums_over_samples() -> None:
+    """Between the nodes in every coordinate; errors are relative to the local value and the median of the speckle."""
     field = rough(height=0.08)
-    power = spectrum_of(field, Azimuths(1536), spacing=power_spectrum.SPACING_OF_A_LINE)
+    power = power_spectrum_of(field, Azimuths(1536), spacing=power_spectrum.SPACING_OF_A_LINE)
     table = spectral.build(power)
     rng = np.random.default_rng(6)
     rho, phi, share = rng.uniform(0.05, 1.9, 60), rng.uniform(-np.pi, np.pi, 60), rng.uniform(0.1, 1.0, 60)
@@ -25,7 +25,7 @@ def test_the_spectral_form_answers_every_wavelength_without_integration() -> Non
     assert error.max() < 3e-2
 
 
-def test_the_spectral_form_says_where_it_ends() -> None:
-    table = spectral.build(spectrum_of(rough(), Azimuths(64), 500.0))
+def test_the_spectral_form_is_nan_outside_the_power_spectrum() -> None:
+    table = spectral.build(power_spectrum_of(rough(), Azimuths(64), 500.0))
     found = spectral.look_up(table, np.array([[1.9, 0.0, -0.1], [0.1, 0.0, -1.9]]), np.array([400.0, 500.0]))
     np.testing.assert_array_equal(np.isnan(found), [[True, False], [True, False]])

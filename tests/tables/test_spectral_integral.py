@@ -11,19 +11,19 @@ from pipeline.optics.light import Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import line_points, quadrature, spectral_integral
-from tests.diffraction.fields import SIGMA, rough, spectrum_of
+from tests.diffraction.fields import SIGMA, power_spectrum_of, rough
 
 LIGHT = Light()
 
 
-# the origin, where radii are mirrored, and out to the rim; rings alone and rings that share points
+# from the origin, where radii are mirrored, to the rim; with single rings and rings that share points
 RHO = np.array([0.0, 0.004, 0.03, 0.4, 1.1, 1.13, 1.16, 1.9, 1.95, 2.0])
 
 
 def integral_error(
     field: HeightField, power: power_spectrum.PolarPowerSpectrum, rule: Quadrature, w_terms: int
 ) -> float:
-    """The largest difference between rings' integrals and the reference's, over the mean and what is there."""
+    """The largest error of the rings' integrals, relative to the sum of mean and local value of the reference."""
     terms = spectral_integral.integrate(
         power.values,
         power.radius_per_um,
@@ -45,7 +45,7 @@ def integral_error(
         )
         exact = np.nan_to_num(reference.power(uvw.reshape(-1, 3), rule.lambda_nm)) @ rule.weights
         exact = exact.reshape(found.shape)
-        # at the rim |w| vanishes and with it all light but the mirror's
+        # at the rim |w| vanishes, and with it all light except the mirror's
         level = exact.mean(axis=(1, 2), keepdims=True) + 1e-7
         worst = max(worst, float(np.max(np.abs(found - exact) / (exact + level))))
     return worst
@@ -53,20 +53,20 @@ def integral_error(
 
 @pytest.mark.parametrize("w_terms", [8, 12])
 @pytest.mark.parametrize(("range_nm", "tolerance"), [((380.0, 780.0), 6e-3), ((500.0, 560.0), 2.5e-2)])
-def test_a_ring_holds_the_integral_over_wavelengths(
+def test_rings_agree_with_the_integral_of_the_reference(
     w_terms: int, range_nm: tuple[float, float], tolerance: float
 ) -> None:
-    """Nodes of w by eight and by four. A narrow range averages less of what the radii's distance leaves."""
+    """For nodes in w in groups of eight and of four. A narrow range averages less of the error between radii."""
     field = rough()
-    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
+    power = power_spectrum_of(field, Azimuths(32, 0.8, 0.2), range_nm[0])
     assert integral_error(field, power, trapezoid(Light(range_nm=range_nm), 5.0), w_terms) < tolerance
 
 
 @pytest.mark.parametrize("step_nm", [60.0, 20.0])
-def test_few_wavelengths_are_their_own_points(step_nm: float) -> None:
-    """Nothing averages what interpolation leaves: radii are as near as for a line."""
+def test_few_wavelengths_are_themselves_the_points(step_nm: float) -> None:
+    """Few wavelengths do not average the error between radii, so radii are as close as for a laser line."""
     field, light = rough(), Light(range_nm=(500.0, 560.0))
-    power = spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, power_spectrum.SPACING_OF_A_LINE)
+    power = power_spectrum_of(field, Azimuths(32, 0.8, 0.2), 500.0, power_spectrum.SPACING_OF_A_LINE)
     rule = trapezoid(light, step_nm)
     rules = quadrature.uniform(rule, len(RHO))
     nodes = power.values.shape[2]
@@ -77,11 +77,11 @@ def test_few_wavelengths_are_their_own_points(step_nm: float) -> None:
 
 
 @pytest.mark.parametrize(("height", "w_terms"), [(0.05, 8), (0.6, 36)])
-def test_points_on_radii_and_between_them_give_one_integral(
+def test_points_on_radii_and_between_them_give_equal_integrals(
     height: float, w_terms: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every ring that is allowed on radii, forced between them, where interpolation over r is the old one."""
-    power = spectrum_of(rough(height=height), Azimuths(32, 0.8, 0.2))
+    """The points of all rings are forced to lie between radii, and the integrals compared."""
+    power = power_spectrum_of(rough(height=height), Azimuths(32, 0.8, 0.2))
     rho = np.linspace(0.0, 2.0, 41)
     rules = quadrature.uniform(trapezoid(LIGHT, 5.0), len(rho))
     of = power.radius_per_um, power.s_max_per_um, rho, rules
@@ -101,8 +101,8 @@ def test_points_on_radii_and_between_them_give_one_integral(
 
 
 @pytest.mark.parametrize("metal", [False, True])
-def test_rings_that_share_points_give_what_each_gives_alone(metal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    power, rings = spectrum_of(rough(), Azimuths(32, 0.8, 0.2)), Rings(140, 0.12)
+def test_rings_that_share_points_agree_with_separate_rings(metal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    power, rings = power_spectrum_of(rough(), Azimuths(32, 0.8, 0.2)), Rings(140, 0.12)
     material = Material(fresnel="conductor") if metal else Material()
     rules = quadrature.uniform(trapezoid(LIGHT, 5.0), rings.count)
     of = power.radius_per_um, power.s_max_per_um, rings.rho(), rules
