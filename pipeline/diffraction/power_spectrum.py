@@ -62,7 +62,7 @@ class PolarPowerSpectrum:
         return s_nodes(self.values.shape[2], self.s_max_per_um)
 
     def thinned(self, every: int) -> "PolarPowerSpectrum":
-        """Takes every `every`-th azimuth; their number must be a multiple of `polar_grid.TILE`."""
+        """Keeps every `every`-th azimuth; the number that remains must be a multiple of `polar_grid.TILE`."""
         tiles, radii, nodes, lanes = self.values.shape
         flat = np.moveaxis(self.values, 3, 1).reshape(tiles * lanes, radii, nodes)[::every]
         values = np.moveaxis(flat.reshape(-1, lanes, radii, nodes), 1, 3)

@@ -25,6 +25,7 @@ class TaylorLayout(Validated):
     @field_validator("resolution")
     @classmethod
     def odd(cls, value: int) -> int:
+        """Checks that (u, v) = (0, 0) is a node. Raises ValueError, which pydantic reports."""
         if value % 2 == 0:
             raise ValueError(f"expected an odd number, so that (u, v) = (0, 0) is a node, got {value}")
         return value
