@@ -98,7 +98,7 @@ test-fast: setup glslang
 
 # PoCL builds for a processor without AVX-512 on one that has it, into a kernel cache of its own. Debian's build of PoCL
 # listens to the first variable, others to the second.
-AVX2_TESTS := tests/physics tests/cli/test_device.py tests/cli/test_polar.py tests/cli/test_run.py
+AVX2_TESTS := tests/diffraction tests/tables tests/accuracy tests/cli/test_device.py tests/cli/test_polar.py tests/cli/test_run.py
 test-avx2: setup
 	cache="$$(mktemp -d)" && trap 'rm -rf "$$cache"' EXIT && \
 		POCL_KERNELLIB_NAME=avx2 POCL_LLVM_CPU_NAME=haswell XDG_CACHE_HOME="$$cache" $(VENV)/bin/python -m pytest $(AVX2_TESTS)

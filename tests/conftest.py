@@ -8,8 +8,8 @@ settings.register_profile("steady", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None)
 settings.load_profile("steady")
 
-# folders whose tests hold laws and closed forms; single modules elsewhere say so themselves
-_PHYSICS = {"physics", "optics", "methods"}
+# folders whose tests hold laws and closed forms; single modules of other folders set the marker themselves
+_PHYSICS = {"accuracy", "diffraction", "methods", "optics", "tables"}
 
 
 @pytest.hookimpl(tryfirst=True)

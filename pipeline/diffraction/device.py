@@ -1,11 +1,11 @@
-"""Whether there is a device to compute on, told as this project tells faults."""
+"""The check that a device works, whose failure is one of the project's errors."""
 
 from kernels import device
 from pipeline.errors import DeviceError
 
 
 def require_device() -> None:
-    """Raises DeviceError, with what was tried and the remedy, where no device works."""
+    """Raises DeviceError if no device works; its message names the attempts and the remedy."""
     try:
         device.default_device()
     except device.NoDeviceError as error:

@@ -1,6 +1,6 @@
-"""DFT stacks: the transforms of every term of a series of exp(i k w h), over the frequencies a view can reach.
+"""DFT stacks: the transforms of all terms of a series of exp(i k w h), for the frequencies that views can reach.
 
-Two series share one form, sum_n c_n(k w) t^n or T_n(t), t = h / H in [-1, 1]:
+Two series have one form, sum_n c_n(k w) term_n(t) with t = h / H in [-1, 1]:
 
 - Taylor ([D14] eq. 5-7): terms t^n, c_n = (i k w H)^n / n!;
 - Chebyshev (Jacobi-Anger): terms T_n(t), c_n = (2 - [n = 0]) i^n J_n(k w H).
@@ -25,23 +25,24 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
 Basis = Literal["taylor", "chebyshev"]
-# 1e-12 of the window's sum is lost to the gaps between samples
+# the sum over samples then differs from the window's integral by 1e-12 of it
 LEAST_SIGMA_PITCHES = 1.2
 _MOST_BYTES = 6 * 2**30
 
 
 @dataclass(frozen=True)
 class Stack:
-    """DFT coefficients F_n[psi, phi] = mean(term_n(h/H) exp(+2 pi i (phi x + psi y))) of one half plane.
+    """DFT coefficients F_n[psi, phi] = mean(term_n(h/H) exp(+2 pi i (phi x + psi y))) of a half plane of frequencies.
 
-    The other half is its conjugate, for heights are real. The sign is Stam's.
+    Heights are real, so the other half plane is the complex conjugate. The sign of the exponent is that of [S99].
 
-    coefficients: float64 or float32 (rows, columns, 2, terms or more): real and imaginary part, terms side by side.
-    terms: of the series; what the coefficients hold beyond fills vectors.
-    row_zero, column_zero: where psi = 0 and phi = 0 stand; phi starts `reach` coefficients below 0.
-    spacing_per_um: (dphi, dpsi), 1/um: one over the patch's size.
-    reach: coefficients (x, y) that the window's transform needs on either side of the nearest one.
-    half_range_um: H. sigma_um: the coherence window's. band_per_um: the scan's band limit (x, y), 1/um.
+    coefficients: float64 or float32 (rows, columns, 2, terms or more): real and imaginary parts, terms contiguous.
+    terms: number of terms of the series; further entries of the last axis fill the device's vectors.
+    row_zero, column_zero: indices of psi = 0 and phi = 0; the first column is at phi = -reach[0] spacings.
+    spacing_per_um: (dphi, dpsi), 1/um, the reciprocal of the patch's size.
+    reach: number of coefficients (x, y) on either side of the nearest one over which the window's transform extends.
+    half_range_um: H, um. sigma_um: standard deviation of the coherence window, um.
+    band_per_um: the scan's Nyquist limits (x, y), 1/um.
     """
 
     basis: Basis
@@ -66,14 +67,20 @@ def build(
     progress: Progress = silent,
     dtype: DTypeLike = np.float64,
 ) -> Stack:
-    """The stack of `terms` terms for |f| <= `frequency_max_per_um` and the band, window cut at `tolerance`.
+    """Transforms the terms of a series ([D14] eq. 5-7 for the Taylor series).
 
-    Terms are made in float64 whatever `dtype` they are transformed and kept in. Raises AccuracyError where the stack
-    would not fit into memory, or the samples do not resolve the window; DeviceError where a Chebyshev stack finds no
-    device that works.
+    Terms are computed in float64, then transformed and stored as `dtype`.
+
+    field: heights of the whole patch. basis: the series. terms: number of terms.
+    sigma_um: standard deviation of the coherence window, um.
+    frequency_max_per_um: highest |f| of interest, 1/um; frequencies above the Nyquist limits are omitted in any case.
+    tolerance: amplitude, relative to its peak, at which the window's transform is cut.
+    progress: called with the share done. dtype: float32 or float64.
+    Returns the stack. Raises AccuracyError if the samples do not resolve the window or the stack does not fit into
+    memory, and DeviceError if a Chebyshev stack is asked for and no device works.
     """
     _check_window(sigma_um, field.pitch_um)
-    # centred after the crop: what is left may lie off the whole patch's mid-range
+    # centred after the crop, because the mid-range of the part may differ from that of the whole patch
     field = crop_to_window(field, sigma_um).centred()
     width, height = field.size_um
     spacing = (1.0 / width, 1.0 / height)
@@ -91,13 +98,13 @@ def build(
 
 
 def _taylor(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
-    """The transforms of t^n, by FFTW."""
+    """Transforms t^n by FFTW."""
     t = np.fft.ifftshift(field.heights_um) * scale_per_um(field)
     term_transforms.transform(_powers(t), kept, out, progress)
 
 
 def _powers(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    """1, t, t^2, ... without end, each in the place of the one before."""
+    """Yields 1, t, t^2, ... without end; each overwrites the one before."""
     power = np.ones_like(t)
     while True:
         yield power
@@ -105,49 +112,61 @@ def _powers(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
 
 
 def _chebyshev(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
-    """The transforms of T_n(t), by a kernel. Raises DeviceError where no device works."""
+    """Transforms T_n(t) by a kernel. Raises DeviceError if no device works."""
     require_device()
     dft_stack.transform(field.heights_um, scale_per_um(field), kept, out, lambda done: progress("stack", done))
 
 
 def scale_per_um(field: HeightField) -> float:
-    """1 / H of a centred field, 1/um; of a flat one, whose t is 0, anything."""
+    """Computes 1 / H of a centred field, 1/um; any value serves a flat field, whose t is 0."""
     return 1.0 / field.half_range_um if field.half_range_um > 0 else 1.0
 
 
 def _check_window(sigma_um: float, pitch_um: tuple[float, float]) -> None:
-    """The samples must resolve the window, or their sum is not its integral: 2 exp(-2 pi^2 (sigma / pitch)^2)."""
+    """Raises AccuracyError if the samples do not resolve the window.
+
+    The sum over samples differs from the window's integral by 2 exp(-2 pi^2 (sigma / pitch)^2) of it.
+    """
     if sigma_um < LEAST_SIGMA_PITCHES * max(pitch_um):
         raise AccuracyError(
-            f"coherence.sigma_um = {sigma_um:g} is finer than the scan resolves: expected at least "
+            f"coherence.sigma_um = {sigma_um:g} is too narrow for the pitch of the scan: expected at least "
             f"{LEAST_SIGMA_PITCHES} pitches, {LEAST_SIGMA_PITCHES * max(pitch_um):.3g} um"
         )
 
 
 def crop_to_window(field: HeightField, sigma_um: float) -> HeightField:
-    """The middle of the patch that the window sees: beyond 8.5 sigma its weight is below float64's rounding."""
+    """Cuts the field to the samples that contribute: beyond 8.5 sigma the window is below float64's rounding.
+
+    sigma_um: standard deviation of the coherence window, um. Returns the middle part of the field.
+    """
     ny, nx = field.shape
-    # a little more where that makes the transform's length a product of small primes
+    # lengths that are products of small primes are fast to transform
     keep_x, keep_y = (
         min(n, next_fast_len(2 * int(np.ceil(BLIND_SIGMAS * sigma_um / pitch)) + 2, real=True))
         for n, pitch in ((nx, field.pitch_um[0]), (ny, field.pitch_um[1]))
     )
-    # sample n // 2 stays the middle one
+    # the middle sample remains at index n // 2
     x, y = nx // 2 - keep_x // 2, ny // 2 - keep_y // 2
     return HeightField(field.heights_um[y : y + keep_y, x : x + keep_x], field.pitch_um)
 
 
 def window_tolerance(tolerance: float) -> float:
-    """Where the window's transform is cut, as amplitude of its peak, for tables of a relative `tolerance`.
+    """Computes the amplitude, relative to its peak, at which the window's transform is cut for a table.
 
-    The tail left out meets bright coefficients beside a dark node, so it is held to a tenth of the budget:
-    1e-4 gives 4.8 sigma_f, 7 x 7 coefficients on a patch of four sigma (the paper takes 4 sigma_f).
+    The omitted tail multiplies coefficients that may be bright where the table is dark, so it gets a tenth of the
+    tolerance. 1e-4 gives 4.8 sigma_f, which is 7 x 7 coefficients on a patch of four sigma; [D14] uses 4 sigma_f.
+
+    tolerance: relative error allowed in the table.
     """
     return 0.1 * tolerance
 
 
 def window_reach(spacing: tuple[float, float], sigma_um: float, tolerance: float) -> tuple[int, int]:
-    """Coefficients (x, y) on either side of the nearest one within which the window exceeds `tolerance`."""
+    """Computes how many coefficients (x, y) on either side of the nearest one the window's transform covers.
+
+    spacing: distance of the coefficients (x, y), 1/um. sigma_um: standard deviation of the window, um.
+    tolerance: amplitude, relative to its peak, at which the transform is cut.
+    """
     radius = reach_sigmas(tolerance) * sigma_f(sigma_um)
     x, y = (floor(radius / d + 0.5) for d in spacing)
     return x, y

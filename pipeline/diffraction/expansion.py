@@ -1,6 +1,6 @@
-"""How many terms a series of exp(i k w h) needs, and how many digits it leaves.
+"""The number of terms that a series of exp(i k w h) needs, and its truncation and rounding errors.
 
-Heights enter as t = h / H in [-1, 1] and the phase as z t with z = k |w| H.
+Heights are scaled to t = h / H in [-1, 1], and the phase is z t with z = k |w| H.
 """
 
 from dataclasses import dataclass
@@ -14,21 +14,24 @@ from pipeline.errors import AccuracyError
 from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 
-# a larger relative error of a table leaves not even one digit
+# with a larger relative error a table has not one correct digit
 LARGEST_TOLERANCE = 0.1
 W_MAX = 2.0  # |w| = cos ti + cos tr
 _MOST_TERMS = 400
-# |P|^2 below this share of the mirror is held to an absolute error: 1e-4 of it is 1e-7 of the mirror
+# errors of |P|^2 below this share of the mirror's are absolute, not relative: 1e-4 of it is 1e-7 of the mirror
 MIRROR_SHARE = 1e-3
-# rms relative rounding of numbers spread evenly over a binade, in units of half an ulp at its lower end:
-# sqrt(1/3) for the position within the ulp, 2^-0.5 for that within the binade
+# rms relative rounding error of numbers distributed evenly over a binade, in half an ulp at its lower end: sqrt(1/3)
+# for the position within the ulp, 2^-0.5 for the position within the binade
 _ROUNDING_RMS = 0.41
-# from here on float64 cannot follow the terms either: exp(2 z) says enough
+# above this phase float64 cannot represent the sum either, and the estimate exp(2 z) is enough
 _HOPELESS_PHASE = 40.0
 
 
 def largest_phase(half_range_um: float, lambda_min_nm: float) -> float:
-    """z = k |w| H at the shortest wavelength and normal directions, radians."""
+    """Computes z = k |w| H, radians, for normal incidence and a normal view (|w| = 2).
+
+    half_range_um: H, um. lambda_min_nm: shortest wavelength, nm.
+    """
     return 2.0 * pi / (1e-3 * lambda_min_nm) * W_MAX * half_range_um
 
 
@@ -36,9 +39,9 @@ def largest_phase(half_range_um: float, lambda_min_nm: float) -> float:
 class TaylorPlan:
     """The Taylor series chosen for a height field.
 
-    order: N, the highest power kept ([D14] eq. 6).
-    truncation: bound on the error of exp(i k w h) by the terms left out, at the worst sample.
-    rounding: expected (rms) error of |P|^2 from tables of I_p kept in float32.
+    order: N, the highest power ([D14] eq. 6).
+    truncation: bound on the error of exp(i k w h) at the worst sample, due to the omitted terms.
+    rounding: expected (rms) error of |P|^2, due to I_p in float32.
     """
 
     order: int
@@ -47,17 +50,20 @@ class TaylorPlan:
 
     @property
     def error(self) -> float:
-        """Predicted error of |P|^2 over max(local value, 1e-3): both amplitudes carry the truncation."""
+        """Predicted error of |P|^2 relative to max(local value, 1e-3); truncation enters by both amplitudes."""
         return 2.0 * self.truncation + self.rounding
 
 
 def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, order: int | None = None) -> TaylorPlan:
-    """The order N for `tolerance` (or the one given), with the error it leaves.
+    """Chooses the order N of a Taylor series and predicts its error ([D14] eq. 6).
 
-    Raises AccuracyError where no order, or not this one, reaches the tolerance in float32 tables.
+    field: heights. quadrature: wavelengths and weights of the tables.
+    tolerance: error of |P|^2 allowed, relative to max(local value, 1e-3 of the mirror).
+    order: N if it is given, None to choose the smallest.
+    Returns the order with its errors. Raises AccuracyError if they exceed the tolerance in float32 tables.
     """
     z = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
-    # two fifths of the budget for the truncation, which enters twice; the rounding is what it is
+    # truncation, which enters twice, gets two fifths of the tolerance; rounding does not depend on the order
     chosen = order if order is not None else taylor_order(z, 0.2 * tolerance)
     plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
     if plan.error > tolerance:
@@ -68,12 +74,12 @@ def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, or
 def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float, order_was_given: bool) -> str:
     text = (
         f"Taylor tables of order N = {plan.order} would err by {plan.error:.1e} of |P|^2 "
-        f"(terms left out {2 * plan.truncation:.1e}, float32 rounding {plan.rounding:.1e}), "
+        f"(truncation {2 * plan.truncation:.1e}, float32 rounding {plan.rounding:.1e}), "
         f"but table.tolerance asks for {tolerance:.1e}; heights span {2 * field.half_range_um:.3g} um. "
     )
     if order_was_given and 2.0 * plan.truncation > 0.5 * tolerance:
         return text + 'Set table.terms = "auto", or a higher number.'
-    # half as much again: the truncation's share of the budget grows with it
+    # half as much again leaves room for truncation, whose share of the tolerance grows with it
     enough = 1.5 * plan.rounding
     if enough <= LARGEST_TOLERANCE:
         return text + f"Set table.tolerance = {enough:.0e}, or lower the heights (a scan's: surface.clip_percentile)."
@@ -81,7 +87,7 @@ def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float, order_was_g
 
 
 def taylor_order(z: float, tolerance: float) -> int:
-    """Smallest N whose remainder is below `tolerance`."""
+    """Computes the smallest N whose Lagrange remainder is at most `tolerance` for the phase z, radians."""
     for order in range(1, _MOST_TERMS):
         if _taylor_remainder(z, order) <= tolerance:
             return order
@@ -89,18 +95,21 @@ def taylor_order(z: float, tolerance: float) -> int:
 
 
 def _taylor_remainder(z: float, order: int) -> float:
-    """Bound on |exp(i z t) - sum_(n <= N) (i z t)^n / n!| for |t| <= 1: z^(N+1) / (N+1)!, Lagrange."""
+    """Computes Lagrange's bound z^(N+1) / (N+1)! on |exp(i z t) - sum_(n <= N) (i z t)^n / n!| for |t| <= 1."""
     n = np.arange(1, order + 2)
-    # capped: e^700 is hopeless enough, and float64 holds it
+    # e^700 is near the largest number of float64
     return exp(min(float(np.sum(np.log(max(z, 1e-300) / n))), 700.0))
 
 
 def float32_rounding(field: HeightField, quadrature: Quadrature) -> float:
-    """Expected error of |P|^2 when I_p are rounded to float32, over max(local value, 1e-3 of the mirror).
+    """Estimates the error of |P|^2 when I_p are rounded to float32.
 
-    The terms of eq. 10 cancel down to |P|^2; rounding is amplified as their sum exceeds it. Two places see the
-    worst of it, away from the mirror direction and in it. Wavelengths are averaged with the quadrature's
-    weights; the worst channel and |w| count.
+    The terms of [D14] eq. 10 cancel, which amplifies rounding by the ratio of their sum to |P|^2. The estimate is the
+    larger of two, away from the mirror direction and in it. Wavelengths are averaged with the weights of the
+    quadrature; the worst channel and |w| count.
+
+    field: heights. quadrature: wavelengths and weights of the tables.
+    Returns the expected error relative to max(local value, 1e-3 of the mirror).
     """
     half_ulp = float(np.finfo(np.float32).eps) / 2
     z_max = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
@@ -111,25 +120,28 @@ def float32_rounding(field: HeightField, quadrature: Quadrature) -> float:
 
 
 def _height_histogram(field: HeightField) -> tuple[Array, Array]:
-    """Values of t = h / H and the share of samples near each."""
+    """Computes a histogram of t = h / H: bin centres and shares of the samples."""
     heights = field.centred().heights_um / max(field.half_range_um, 1e-300)
     counts, edges = np.histogram(heights, bins=512, range=(-1.0, 1.0))
     return 0.5 * (edges[1:] + edges[:-1]), counts / counts.sum()
 
 
 def _term_factors(z: Array, z_max: float) -> Array:
-    """z^n / n! (L, n) until they are negligible."""
+    """Computes z^n / n! (L, n) for phases z (L,), up to the n at which they are negligible."""
     n = np.arange(1, int(3.0 * z_max) + 30)
     return np.cumprod(np.concatenate([np.ones((len(z), 1)), z[:, None] / n], axis=1), axis=1)
 
 
 def _channel_shares(quadrature: Quadrature) -> Array:
-    """Each wavelength's share of its channel (L, 3); 0 where a channel sees nothing, as Z of a red laser."""
+    """Computes each wavelength's share of its channel (L, 3); 0 for a channel without weight, as Z of a red laser."""
     return np.asarray(quadrature.weights / np.maximum(np.abs(quadrature.weights).sum(axis=0), 1e-300))
 
 
 def _diffuse_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature) -> float:
-    """A^2, A = sum_n z^n / n! sqrt(mean t^2n): by Parseval a term has this rms where P has 1."""
+    """Computes A^2, A = sum_n z^n / n! sqrt(mean t^2n), the amplification away from the mirror direction.
+
+    By Parseval's theorem each term has this rms value where P has 1.
+    """
     factors = _term_factors(z_max * quadrature.lambda_min_nm / quadrature.lambda_nm, z_max)
     root_mean_powers = np.sqrt(t ** (2 * np.arange(factors.shape[1])[:, None]) @ share)
     weights = np.abs(_channel_shares(quadrature))
@@ -137,9 +149,9 @@ def _diffuse_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature) 
 
 
 def _specular_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature) -> float:
-    """rms sum of the w^p I_p over max(sum_p w^p I_p, 1e-3) at (u, v) = 0, where FT{t^n} is mean(t^n).
+    """Computes the rms sum of w^p I_p relative to max(sum_p w^p I_p, 1e-3) at (u, v) = 0, where FT{t^n} = mean(t^n).
 
-    The roundings of different p are independent, so they add up as squares.
+    Rounding errors of different p are independent, so their squares add up.
     """
     kh = z_max / W_MAX * quadrature.lambda_min_nm / quadrature.lambda_nm
     factors = _term_factors(kh, z_max)
@@ -154,7 +166,10 @@ def _specular_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature)
 
 
 def chebyshev_order(z: float, tolerance: float) -> int:
-    """Smallest N with 2 sum_(n > N) |J_n(z)| <= `tolerance`: the tail of Jacobi-Anger at phase z."""
+    """Computes the smallest N with 2 sum_(n > N) |J_n(z)| <= `tolerance`, the tail of the Jacobi-Anger expansion.
+
+    z: phase, radians. tolerance: error allowed in exp(i z t).
+    """
     orders = np.arange(int(z) + 400)
     tail: Array = 2.0 * np.cumsum(np.abs(jv(orders, z))[::-1])[::-1]
     return max(1, int(np.argmax(tail <= tolerance)) - 1)

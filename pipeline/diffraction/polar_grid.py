@@ -1,10 +1,10 @@
-"""The polar grid of (u, v): rings and azimuths, and where a direction lies among them.
+"""The polar grid of (u, v), and the mappings between directions and its rings and azimuths.
 
 Spectral integration blurs along the radius (f = rho / lambda) and not along the azimuth, so rings may be few and
-azimuths many. Ring i has rho = r0 sinh(i dx): even near the mirror direction, by ratios beyond. Azimuths are even in
-the angle of (u, v) stretched along the axis where the surface diffracts least, so that they lie closer where it
-diffracts most: with (u', v') turned by `axis`, azimuth j has atan2(v', stretch u') = 2 pi j / count. A turn by half
-maps azimuth j to j + count / 2 for every stretch.
+azimuths many. Ring i has rho = r0 sinh(i dx): evenly spaced near the mirror direction, in a constant ratio further
+out. Azimuths are evenly spaced in the angle of (u, v), stretched across the direction in which the surface scatters
+most, so that they are denser there: with (u', v') = (u, v) rotated by -axis, azimuth j has
+atan2(v', stretch u') = 2 pi j / count. Half a turn maps azimuth j to j + count / 2 for every stretch.
 
 In a texture azimuth j is the centre of texel column j and ring i that of row i: texture coordinates
 ((j + 1/2) / azimuths, (i + 1/2) / rings), periodic along the first.
@@ -17,38 +17,48 @@ import numpy as np
 
 from pipeline.arrays import Array
 
-RHO_MAX = 2.0  # |(u, v)| of grazing light seen from the light's own side
-TILE = 32  # azimuths come in whole vectors for either half turn
+RHO_MAX = 2.0  # |(u, v)| of grazing light and a view in the same direction
+TILE = 32  # azimuths fill whole vectors of the device in both half turns
 
 
 @dataclass(frozen=True)
 class Azimuths:
-    """`count` azimuths (a multiple of 32), closest about `axis_rad` where `stretch` < 1."""
+    """The azimuths of a polar grid.
+
+    count: number of azimuths, a multiple of TILE.
+    stretch: 1 spaces them evenly; below 1 they are denser about the axis.
+    axis_rad: the axis, radians from +u to +v.
+    """
 
     count: int
     stretch: float = 1.0
     axis_rad: float = 0.0
 
-    def angles(self) -> Array:
-        """phi of every azimuth, radians."""
+    def phi(self) -> Array:
+        """Computes the angle of every azimuth (count,), radians; the inverse is `azimuth_from_uv`."""
         even = 2.0 * pi * np.arange(self.count) / self.count
         return np.asarray(np.arctan2(self.stretch * np.sin(even), np.cos(even)) + self.axis_rad)
 
-    def index(self, uv: Array) -> Array:
-        """Fractional azimuth (...,) in [0, count) of (u, v) (..., 2)."""
+    def azimuth_from_uv(self, uv: Array) -> Array:
+        """Computes the fractional index of an azimuth (...,), in [0, count), from (u, v) (..., 2)."""
         cosine, sine = np.cos(self.axis_rad), np.sin(self.axis_rad)
         along, across = (
             cosine * uv[..., 0] + sine * uv[..., 1],
             cosine * uv[..., 1] - sine * uv[..., 0],
         )
         turns = np.arctan2(across, self.stretch * along) / (2.0 * pi)
-        # a hair below 0 rounds up to 1
+        # a value just below 0 becomes 1 by rounding
         return np.asarray((turns % 1.0) * self.count % self.count)
 
 
 @dataclass(frozen=True)
 class Rings:
-    """`count` rings from 0 to `rho_max`, even below `r0` and by ratios beyond."""
+    """The rings of a polar grid, rho = r0 sinh(i dx).
+
+    count: number of rings; the first is at rho = 0 and the last at `rho_max`.
+    r0: radius below which the rings are evenly spaced, dimensionless. Above it, their ratio is constant.
+    rho_max: |(u, v)| of the last ring, dimensionless.
+    """
 
     count: int
     r0: float
@@ -56,27 +66,28 @@ class Rings:
 
     @property
     def step(self) -> float:
-        """dx of rho = r0 sinh(i dx)."""
+        """Step dx of arsinh(rho / r0) from ring to ring."""
         return asinh(self.rho_max / self.r0) / (self.count - 1)
 
     def rho(self) -> Array:
-        """rho of every ring."""
+        """Computes the radius of every ring (count,), dimensionless; the inverse is `ring_from_rho`."""
         found = self.r0 * np.sinh(np.arange(self.count) * self.step)
         found[-1] = self.rho_max
         return np.asarray(found)
 
-    def index(self, rho: Array) -> Array:
-        """Fractional ring (...,) of rho; beyond count - 1 outside the grid."""
+    def ring_from_rho(self, rho: Array) -> Array:
+        """Computes the fractional index of a ring (...,) from rho (...,); above count - 1 outside the grid."""
         return np.asarray(np.arcsinh(rho / self.r0) / self.step)
 
 
 @dataclass(frozen=True)
 class PolarGrid:
-    """Where the texels of a polar table lie."""
+    """The texels of a polar table: every ring with every azimuth."""
 
     rings: Rings
     azimuths: Azimuths
 
     @property
     def texels(self) -> int:
+        """Number of texels."""
         return self.rings.count * self.azimuths.count

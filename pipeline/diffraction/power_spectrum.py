@@ -1,8 +1,8 @@
-"""The polar power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2: what a surface does to any light.
+"""The polar power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2 of a surface, with s = k |w|.
 
-It knows no illuminant, observer or material: |P|^2(u, v, w; lambda) = E(rho / lambda, phi, 2 pi |w| / lambda) with
-(rho, phi) the polar form of (u, v). Nodes in s are Chebyshev's, so E between them is a polynomial; nodes in r serve
-Lagrange interpolation; azimuths are those of the tables made from it.
+It depends on no illuminant, observer or material: |P|^2(u, v, w; lambda) = E(rho / lambda, phi, 2 pi |w| / lambda),
+where (rho, phi) are the polar coordinates of (u, v). E is interpolated between Chebyshev nodes in s and, by Lagrange
+polynomials, between radii; its azimuths are those of the tables made from it.
 """
 
 from dataclasses import dataclass, replace
@@ -22,23 +22,26 @@ from pipeline.optics.coherence import sigma_f
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
-# distances of radii in sigma_f. At one, interpolation on 8 nodes leaves up to a tenth of E, which an integral over
-# wavelengths averages out; a laser line shows it. Near the origin the lobe's flank is seen at full contrast.
+# distances of radii in sigma_f. At a distance of 1, interpolation on 8 radii errs by up to a tenth of E, which an
+# integral over wavelengths averages out and a laser line does not. Near the origin, where the flank of the specular
+# lobe is steep, nothing averages.
 SPACING, SPACING_OF_A_LINE, _SPACING_AT_ZERO = 1.0, 0.4, 0.25
 _COARSENS_OVER = 30.0  # sigma_f
 _SPARE_RADII = 5
-# how far E goes on in s, in |w| = 2 at the shortest wavelength: that far, rings of a table share its points, which
-# saves an eighth to a quarter of the operator for one node in s
+# s_max in units of 4 pi / lambda_min. The margin lets neighbouring rings share interpolation points: the spectral
+# integral takes 12 to 25 % less work for one more Chebyshev node
 S_REACH = 1.1
 _CONTRAST_AZIMUTHS = 65
 
 
 @dataclass(frozen=True)
 class PolarPowerSpectrum:
-    """E on radii, azimuths and nodes in s.
+    """The power spectrum E on radii, azimuths and Chebyshev nodes in s.
 
-    values: float32 (tiles, radii, s nodes, 16): azimuth 16 tile + lane; 0 beyond the scan's band.
-    radius_per_um: (radii,) ascending from 0. s_max_per_um: E is known for s in [0, s_max], at Chebyshev's nodes.
+    values: float32 (tiles, radii, s nodes, 16), azimuth 16 tile + lane; 0 beyond the scan's Nyquist limits.
+    radius_per_um: radii (n_r,), 1/um, ascending from 0. azimuths: those of the tables.
+    s_max_per_um: end of the interval [0, s_max] of the Chebyshev nodes, 1/um.
+    sigma_um: standard deviation of the coherence window, um. band_per_um: the scan's Nyquist limits (x, y), 1/um.
     """
 
     values: NDArray[np.float32]
@@ -50,16 +53,16 @@ class PolarPowerSpectrum:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of E."""
+        """Size of E in bytes."""
         return self.values.nbytes
 
     @property
     def s_per_um(self) -> Array:
-        """The nodes in s = 2 pi |w| / lambda, 1/um."""
+        """Nodes (n_s,) in s = 2 pi |w| / lambda, 1/um."""
         return s_nodes(self.values.shape[2], self.s_max_per_um)
 
     def thinned(self, every: int) -> "PolarPowerSpectrum":
-        """The same on every `every`-th azimuth; what is left must fill whole tiles of both half turns."""
+        """Keeps every `every`-th azimuth; the number that remains must be a multiple of `polar_grid.TILE`."""
         tiles, radii, nodes, lanes = self.values.shape
         flat = np.moveaxis(self.values, 3, 1).reshape(tiles * lanes, radii, nodes)[::every]
         values = np.moveaxis(flat.reshape(-1, lanes, radii, nodes), 1, 3)
@@ -68,28 +71,33 @@ class PolarPowerSpectrum:
 
 
 def speckle_contrast(power: PolarPowerSpectrum) -> float:
-    """Variance of E over its squared local mean: 1 for the speckle of one window, 1 / n for the mean of n.
+    """Computes the variance of E relative to its squared local mean.
 
-    Taken over azimuths, at the radii beyond the specular lobe and the middle node in s; where E is dark or smooth it
-    counts as little.
+    It is 1 for fully developed speckle, and 1 / n for the mean over n independent windows. It is taken over azimuths
+    at the middle node in s, and is the median over the radii beyond the specular lobe.
     """
     tiles, radii, nodes, lanes = power.values.shape
     e = np.moveaxis(power.values[:, radii // 4 : -_SPARE_RADII, nodes // 2], 2, 1).reshape(tiles * lanes, -1)
     kernel = np.ones(min(_CONTRAST_AZIMUTHS, len(e)))
     kernel /= len(kernel)
-    # around the turn: E is periodic
+    # E is periodic in the azimuth
     local = np.fft.irfft(np.fft.rfft(e, axis=0) * np.fft.rfft(kernel, len(e))[:, None], len(e), axis=0)
     local = np.maximum(np.roll(local, -(len(kernel) // 2), axis=0), np.finfo(np.float32).tiny)
     return float(np.median(np.mean((e / local - 1.0) ** 2, axis=0)))
 
 
 def s_nodes(count: int, s_max_per_um: float) -> Array:
-    """Chebyshev's nodes on [0, s_max]."""
+    """Computes `count` Chebyshev nodes (count,) on [0, s_max], 1/um."""
     return np.asarray(0.5 * s_max_per_um * (1.0 + chebyshev(count)[1]))
 
 
 def radii(sigma_um: float, r_max_per_um: float, spacing: float = SPACING) -> Array:
-    """Radii from 0 to `r_max_per_um` and a few beyond, 1/um; `spacing` in widths of the window's transform."""
+    """Chooses the radii of E: from 0 to `r_max_per_um`, and a few beyond it for interpolation.
+
+    sigma_um: standard deviation of the coherence window, um. r_max_per_um: the largest |f| of a table, 1/um.
+    spacing: distance of the radii away from the origin, in widths sigma_f of the window's transform.
+    Returns the radii (n_r,), 1/um, ascending from 0.
+    """
     width = sigma_f(sigma_um)
     nodes = [0.0]
     while nodes[-1] < r_max_per_um:
@@ -106,9 +114,14 @@ def chebyshev_stack(
     tolerance: float,
     progress: Progress = silent,
 ) -> dft_stack.Stack:
-    """The float32 stack that E out to `reach_per_um` gathers from.
+    """Builds the float32 Chebyshev stack from which E is gathered.
 
-    It fills whole vectors: they cost the same, and are shared with the device without a copy.
+    Its last axis is filled to whole vectors: they cost the same, and the device uses them without a copy.
+
+    field: heights of one window. sigma_um: standard deviation of the coherence window, um.
+    reach_per_um: the largest radius of E, 1/um. terms: number of Chebyshev terms.
+    tolerance: amplitude, relative to its peak, at which the window's transform is cut.
+    Returns the stack. Raises AccuracyError and DeviceError as `dft_stack.build` does.
     """
     filled = polar_power_spectrum.LANES * ceil(terms / polar_power_spectrum.LANES)
     built = dft_stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
@@ -116,19 +129,22 @@ def chebyshev_stack(
 
 
 def s_max(lambda_min_nm: float) -> float:
-    """The largest s = k |w| of E, 1/um: somewhat beyond |w| = 2 at the shortest wavelength."""
+    """Computes the largest s = k |w| of E, 1/um: S_REACH times that of |w| = 2 at the shortest wavelength, nm."""
     return S_REACH * 2.0 * pi * expansion.W_MAX / (1e-3 * lambda_min_nm)
 
 
 def gather(
     built: dft_stack.Stack, half_turn: Array, radius_per_um: Array, lambda_min_nm: float, nodes: int
 ) -> NDArray[np.float32]:
-    """E (tiles, radii, nodes, 16) at azimuths of half a turn (radians, a multiple of 16), then at their opposites.
+    """Computes E at azimuths of half a turn and at their opposites, by the Jacobi-Anger expansion.
 
-    Raises DeviceError where no device works.
+    built: a Chebyshev stack. half_turn: azimuths (a,), radians, a multiple of 16. radius_per_um: radii (n_r,), 1/um.
+    lambda_min_nm: shortest wavelength, nm, which sets s_max. nodes: number of Chebyshev nodes in s.
+    Returns E (2 a / 16, n_r, nodes, 16), first the given azimuths, then their opposites. Raises DeviceError if no
+    device works.
     """
     n = np.arange(built.terms)[:, None]
-    # w < 0 makes s negative in Jacobi-Anger, and J_n(-z) = (-1)^n J_n(z)
+    # w < 0 makes the argument of the Jacobi-Anger expansion negative, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
     bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
     return polar_power_spectrum.gather(upload(built), radius_per_um, half_turn, bessel)
@@ -137,8 +153,13 @@ def gather(
 def build(
     built: dft_stack.Stack, azimuths: Azimuths, radius_per_um: Array, lambda_min_nm: float, nodes: int
 ) -> PolarPowerSpectrum:
-    """E of a Chebyshev stack on given azimuths and radii, out to `s_max`."""
-    values = gather(built, azimuths.angles()[: azimuths.count // 2], radius_per_um, lambda_min_nm, nodes)
+    """Computes the power spectrum of a Chebyshev stack for s up to `s_max`.
+
+    built: the stack. azimuths: those of the tables. radius_per_um: radii (n_r,), 1/um, ascending from 0.
+    lambda_min_nm: shortest wavelength, nm. nodes: number of Chebyshev nodes in s.
+    Raises DeviceError if no device works.
+    """
+    values = gather(built, azimuths.phi()[: azimuths.count // 2], radius_per_um, lambda_min_nm, nodes)
     return PolarPowerSpectrum(
         values, radius_per_um, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um
     )

@@ -1,11 +1,10 @@
-"""The truth every other way is held against: |P|^2 by direct summation, and its spectral integral at 1 nm.
+"""The ground truth: |P|^2 by two algorithms ([D14] eq. 1 and 8), and its spectral integral in steps of 1 nm.
 
-Two routes to the same number:
-
-- `power_direct` adds up the samples one by one, float64, no series, no table. Slow and obviously right.
-- `Reference` serves maps in bearable time. It expands exp(i k w h) in Chebyshev polynomials (Jacobi-Anger, terms to
-  2e-11 of the mirror), transforms each once, and gathers the window's neighbourhood, cut at the same share, per
-  direction and wavelength on the device, in float64. Directions of one v, such as a map's rows, share sums.
+- `power_direct` sums over all samples in float64, without a series or a table. It is slow and easy to verify.
+- `Reference` is fast enough for maps. It expands exp(i k w h) in Chebyshev polynomials (Jacobi-Anger expansion),
+  transforms each term once, and sums the coefficients under the window's transform for each direction and wavelength,
+  on the device in float64. The series and the window are cut at 2e-11 of the mirror. Directions with the same v, such
+  as the rows of a map, share sums.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -26,17 +25,21 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
 STEP_NM = FINE_STEP_NM
-# in amplitude; on 65 um it is 9 x 9 coefficients where 1e-12 needs 11 x 11
+# relative amplitude at which the series and the window are cut; on 65 um the window takes 9 x 9 coefficients, where
+# 1e-12 would take 11 x 11
 _TOLERANCE = 2e-11
 _DIRECTIONS_AT_ONCE = 8192
 _ROWS_AT_ONCE = 32
 
 
 def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: float) -> Array:
-    """|P|^2 (directions,) = |sum g p exp(+2 pi i f.x) / sum g|^2 at one wavelength, `uvw` (directions, 3).
+    """Computes |P|^2 = |sum g p exp(+2 pi i f.x) / sum g|^2 by summing over all samples ([D14] eq. 1 and 8).
 
-    f = (u, v) / lambda, p = exp(i k w h) on a patch repeating under the window g (docs/conventions.md; [D14] eq. 1
-    and 8). NaN beyond the scan's band.
+    f = (u, v) / lambda and p = exp(i k w h); the patch repeats periodically under the window g (docs/conventions.md).
+
+    field: heights. sigma_um: standard deviation of the coherence window, um. uvw: (directions, 3).
+    lambda_nm: one wavelength, nm.
+    Returns |P|^2 (directions,), NaN beyond the scan's Nyquist limits.
     """
     lambda_um = 1e-3 * lambda_nm
     heights = field.centred().heights_um
@@ -48,11 +51,11 @@ def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: flo
         along_x = folded_window(nx, px, sigma_um, u / lambda_um)
         along_y = folded_window(ny, py, sigma_um, v / lambda_um)
         amplitude = 0.0j
-        # a few rows at a time stay in a core's cache
+        # blocks of a few rows remain in the cache of a core
         for first in range(0, ny, _ROWS_AT_ONCE):
             rows = slice(first, min(first + _ROWS_AT_ONCE, ny))
             phase = 2.0 * pi / lambda_um * w * heights[rows]
-            # vecdot conjugates its first; a product of matrices would start threads that get in each other's way
+            # vecdot conjugates its first argument; a matrix product would start competing threads
             amplitude += np.sum(along_y[rows] * np.vecdot(np.cos(phase) - 1j * np.sin(phase), along_x))
         power[i] = np.abs(amplitude / total) ** 2
     power[~in_band(field, uvw, np.array([lambda_um]))[:, 0]] = np.nan
@@ -60,13 +63,20 @@ def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: flo
 
 
 def in_band(field: HeightField, uvw: Array, lambda_um: Array) -> NDArray[np.bool_]:
-    """Whether (u, v) / lambda lies within the scan's band limit along both axes, (directions, L)."""
+    """Whether (u, v) / lambda lies within the scan's Nyquist limits along both axes.
+
+    uvw: (directions, 3). lambda_um: (L,), um. Returns bool (directions, L).
+    """
     fx, fy = field.band_limit_per_um
     return np.asarray((np.abs(uvw[:, :1]) / lambda_um <= fx) & (np.abs(uvw[:, 1:2]) / lambda_um <= fy))
 
 
 def xyz_direct(field: HeightField, sigma_um: float, light: Light, material: Material, wi: Array, wr: Array) -> Array:
-    """XYZ (directions, 3) under 1 RU by `power_direct` at every nanometre; `wi`, `wr` (directions, 3)."""
+    """Computes XYZ at an exposure of 1 RU by `power_direct`, in steps of 1 nm.
+
+    wi, wr: unit vectors (directions, 3). The other parameters are those of `power_direct` and `integrate`.
+    Returns (directions, 3).
+    """
     quadrature = trapezoid(light, STEP_NM)
     uvw = geometry.uvw(wi, wr)
     power = np.stack([power_direct(field, sigma_um, uvw, nm) for nm in quadrature.lambda_nm], axis=-1)
@@ -76,10 +86,14 @@ def xyz_direct(field: HeightField, sigma_um: float, light: Light, material: Mate
 def integrate(
     power: Array, quadrature: Quadrature, material: Material, sigma_um: float, wi: Array, wr: Array
 ) -> Array:
-    """XYZ (directions, 3) = C cos(ti) sum_l |P|^2 weights (docs/conventions.md) from |P|^2 (directions, L).
+    """Computes XYZ = C cos(ti) sum_l |P|^2 weights (docs/conventions.md).
 
-    What lies beyond the scan's band (NaN) is unknown and adds nothing. A metal's reflectance is taken at every
-    wavelength and half angle.
+    NaN, beyond the scan's Nyquist limits, counts as 0. A metal's reflectance is taken at every wavelength and half
+    angle.
+
+    power: |P|^2 (directions, L). quadrature: wavelengths (L,), nm, and weights (L, 3) of light and observer.
+    sigma_um: standard deviation of the coherence window, um. wi, wr: unit vectors (directions, 3).
+    Returns (directions, 3).
     """
     if material.fresnel == "conductor":
         power = power * brdf.metal_reflectance(material, quadrature, geometry.cos_half(wi, wr))
@@ -88,29 +102,35 @@ def integrate(
         factor = brdf.direction_factor(material, quadrature, wi, wr)
     weights = quadrature.weights * brdf.window_area(material, quadrature, sigma_um)[:, None]
     sums = _sums(power, weights)
-    # few directions reach beyond the band: only theirs are summed a second time, without what is unknown
+    # few directions exceed the Nyquist limits; only their sums are repeated, with 0 for NaN
     unknown = np.isnan(sums[:, 0])
     sums[unknown] = _sums(np.nan_to_num(power[unknown]), weights)
     return np.asarray(factor[:, None] * sums)
 
 
 def _sums(power: Array, weights: Array) -> Array:
-    """sum_l power_l weights_l (directions, channels) of `power` (directions, L) and `weights` (L, channels)."""
-    # a product of matrices would start threads, which cost more than so few columns
+    """Computes sum_l power_l weights_l (directions, channels); power: (directions, L), weights: (L, channels)."""
+    # a matrix product would start threads, which cost more than the sum over three columns
     return np.stack([np.vecdot(power, channel) for channel in weights.T], axis=-1)
 
 
 class Reference:
     """|P|^2 and XYZ of one height field for any directions, exact to 1e-9 of the mirror.
 
-    stored_bytes: of the DFT of every term, which each answer gathers from.
+    stored_bytes: size of the DFT stack.
     """
 
     def __init__(
         self, field: HeightField, sigma_um: float, lambda_min_nm: float, progress: Progress = silent
     ) -> None:
+        """Transforms the Chebyshev terms of the height field.
+
+        sigma_um: standard deviation of the coherence window, um. lambda_min_nm: shortest wavelength, nm.
+        Raises AccuracyError if the samples do not resolve the window or the stack does not fit into memory, and
+        DeviceError if no device works.
+        """
         z = expansion.largest_phase(field.half_range_um, lambda_min_nm)
-        # whole vectors of terms cost the same and are shared with the device without a copy
+        # whole vectors of terms cost the same, and the device uses them without a copy
         lanes = windowed_dft.LANES
         terms = lanes * -(-(expansion.chebyshev_order(z, _TOLERANCE) + 1) // lanes)
         reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
@@ -120,7 +140,10 @@ class Reference:
         self.stored_bytes = built.coefficients.nbytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
+        """Computes |P|^2 (directions, L), NaN beyond the scan's Nyquist limits.
+
+        uvw: (directions, 3), as many as fit into memory with L. lambda_nm: (L,), nm.
+        """
         return np.asarray(windowed_dft.exact_power(self._stack, uvw, 1e-3 * lambda_nm))
 
     def xyz(
@@ -132,7 +155,10 @@ class Reference:
         step_nm: float = STEP_NM,
         progress: Progress = silent,
     ) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Computes XYZ (directions, 3) at an exposure of 1 RU for unit vectors wi, wr (directions, 3).
+
+        step_nm: step of the spectral integral, nm.
+        """
         quadrature = trapezoid(light, step_nm)
         uvw = geometry.uvw(wi, wr)
         order, out = windowed_dft.line_order(uvw), np.empty((len(wr), 3))
@@ -145,28 +171,37 @@ class Reference:
 
 
 class MeanReference:
-    """The mean of |P|^2 over several places of the window, each by a `Reference` of its own.
+    """The mean of |P|^2 over several positions of the coherence window, each computed by its own `Reference`.
 
-    One is in memory at a time: each answer makes all of them again but the first.
+    Only the first stays in memory; the others are built again for every call.
     """
 
     def __init__(
         self, fields: Sequence[HeightField], sigma_um: float, lambda_min_nm: float, progress: Progress = silent
     ) -> None:
+        """Builds the reference of the first window.
+
+        fields: one height field per position of the window (pipeline.surface.windows).
+        sigma_um: standard deviation of the window, um. lambda_min_nm: shortest wavelength, nm.
+        Raises AccuracyError and DeviceError as `Reference` does.
+        """
         self.fields, self._sigma_um, self._lambda_min_nm, self._progress = fields, sigma_um, lambda_min_nm, progress
         self.first = Reference(fields[0], sigma_um, lambda_min_nm, progress)
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the height fields and of the one reference that stays in memory."""
+        """Size in bytes of the height fields and of the reference in memory."""
         return self.first.stored_bytes + sum(field.nbytes for field in self.fields)
 
     def xyz(self, light: Light, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
-        """XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
+        """Computes XYZ (directions, 3) at an exposure of 1 RU for unit vectors wi, wr (directions, 3)."""
         return self._mean(lambda each: each.xyz(light, material, wi, wr, progress=progress))
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """|P|^2 (directions, L); NaN beyond the scan's band. Callers bound how many they ask for at once."""
+        """Computes |P|^2 (directions, L), NaN beyond the scan's Nyquist limits.
+
+        uvw: (directions, 3), as many as fit into memory with L. lambda_nm: (L,), nm.
+        """
         return self._mean(lambda each: each.power(uvw, lambda_nm))
 
     def _mean(self, answer: Callable[[Reference], Array]) -> Array:

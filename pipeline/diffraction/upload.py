@@ -1,14 +1,13 @@
-"""From a stack in memory to one on the device, faults told as this project tells them."""
+"""The transfer of a DFT stack to the device."""
 
-from kernels import source, windowed_dft
+from kernels import windowed_dft
 from pipeline.diffraction.device import require_device
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
-from pipeline.store import digest
 
 
 def upload(built: Stack) -> windowed_dft.DeviceStack:
-    """The stack on the default device. Raises DeviceError where none works."""
+    """Copies a stack to the default device. Raises DeviceError if no device works."""
     require_device()
     return windowed_dft.upload_stack(
         built.coefficients,
@@ -19,8 +18,3 @@ def upload(built: Stack) -> windowed_dft.DeviceStack:
         built.half_range_um,
         built.band_per_um,
     )
-
-
-def kernel_digest(*names: str) -> str:
-    """Return the digest of kernels' sources, by their files' names, with what these include."""
-    return digest.of_json(source.text(*names))

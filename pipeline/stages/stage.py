@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from kernels import source
 from pipeline.config.models import Config
 from pipeline.progress import Progress
 from pipeline.stages.session import Session
@@ -58,6 +59,11 @@ class Stage:
                 "inputs": {name: input_keys[name] for name in self.inputs},
             }
         )
+
+
+def kernel_digest(*names: str) -> str:
+    """Computes the digest of the sources of kernels, given by their files' names, with the files that they include."""
+    return digest.of_json(source.text(*names))
 
 
 def file_or_name(name: str) -> dict[str, str]:

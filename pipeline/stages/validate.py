@@ -9,11 +9,10 @@ from typing import Any
 from pipeline import layouts
 from pipeline.accuracy import checks, convergence
 from pipeline.config.models import Config
-from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import render, surface
 from pipeline.stages.layout import Layout
-from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
 from pipeline.tables.evaluate import table_evaluator
 
 REPORT = "report.html"

@@ -1,4 +1,4 @@
-"""Radiance in XYZ for pairs of directions, from a table or from the exact reference."""
+"""Radiance in XYZ for pairs of directions, from a table or from the exact reference; BRDF maps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,23 +11,27 @@ from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.progress import Progress, silent
 
-# XYZ (directions, 3) under 1 RU for wi, wr (directions, 3)
+# computes XYZ (directions, 3) at an exposure of 1 RU for unit vectors wi, wr (directions, 3)
 Evaluator = Callable[[Array, Array], Array]
 _AT_ONCE = 16384
 
 
 class Table(Protocol):
-    """A table of any layout, as it is looked up."""
+    """The look-up that tables of all layouts provide."""
 
     def look_up(self, uvw: Array) -> Array:
-        """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN where the table does not reach."""
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the table."""
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
-        """C cos(ti) (directions,): the factors of the radiance that the table leaves out."""
+        """Computes C cos(ti) (directions,), the factors that the table does not hold, for wi, wr (directions, 3)."""
 
 
 def table_evaluator(table: Table, radiometry: Radiometry, progress: Progress = silent) -> Evaluator:
-    """XYZ = C cos(ti) times the table's value; NaN where the table's scene does not reach."""
+    """Makes the function that computes XYZ from a table, C cos(ti) times the table's value.
+
+    table: of any layout. radiometry: light, material and coherence window. progress: called with the share done.
+    Returns the function, which gives NaN outside the scene of the table.
+    """
 
     def evaluate(wi: Array, wr: Array) -> Array:
         factor = table.direction_factor(radiometry, wi, wr)
@@ -44,39 +48,46 @@ def table_evaluator(table: Table, radiometry: Radiometry, progress: Progress = s
 
 @dataclass(frozen=True)
 class Map:
-    """The views of a BRDF map ([D14] sec. 7): pixel centre (x, y) in [-1, 1]^2 is (sin t cos p, sin t sin p).
+    """The views of a BRDF map ([D14] sec. 7).
 
-    +y is up: the first image row has y near +1. Pixels outside `radius` are no views and stay 0.
+    The pixel centre (x, y) in [-1, 1]^2 is the view direction (sin t cos p, sin t sin p). +y is up: the first image
+    row has y near +1. Pixels outside `radius` are not views and are 0.
+
+    size: pixels along each side. radius: largest sin t of a view, dimensionless.
     """
 
     size: int
     radius: float = 1.0
 
     def _axes(self) -> tuple[Array, Array]:
-        # in this order of steps opposite pixels are opposite to the last bit, so that one sum serves both
+        # this order of operations makes opposite pixels exactly opposite, so that one sum serves both
         centre = (2.0 * np.arange(self.size) + 1.0 - self.size) / self.size
         x, y = np.meshgrid(centre, -centre)
         return x, y
 
     @property
     def inside(self) -> np.ndarray:
-        """bool (size, size): pixels that are views."""
+        """Mask of the pixels that are views, bool (size, size)."""
         x, y = self._axes()
         return np.asarray(np.hypot(x, y) < self.radius)
 
     def views(self) -> Array:
-        """Directions (views, 3) of the pixels inside, row by row."""
+        """Computes the unit vectors (views, 3) of the pixels that are views, row by row."""
         x, y = (axis[self.inside] for axis in self._axes())
         return np.stack([x, y, np.sqrt(1.0 - x**2 - y**2)], axis=-1)
 
     def image(self, values: Array) -> Array:
-        """Values of the views (views, ...) as an image (size, size, ...), 0 outside."""
+        """Arranges values of the views (views, ...) as an image (size, size, ...), 0 outside."""
         out = np.zeros((self.size, self.size, *values.shape[1:]))
         out[self.inside] = values
         return out
 
 
 def render_map(evaluate: Evaluator, light: Array, views: Map) -> Array:
-    """XYZ image (size, size, 3) under 1 RU from one light, a direction (3,)."""
+    """Computes a map at an exposure of 1 RU.
+
+    evaluate: computes XYZ of pairs of directions. light: unit vector (3,). views: the pixels.
+    Returns XYZ (size, size, 3).
+    """
     wr = views.views()
     return views.image(evaluate(np.broadcast_to(light, wr.shape), wr))

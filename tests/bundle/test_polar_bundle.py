@@ -67,7 +67,7 @@ def test_the_mapping_told_is_the_grids(bake: Baker, bundle: Path) -> None:
     assert (told.height, told.width) == (40, 192)
     rho = told.r0 * np.sinh(np.arange(told.height) * told.step)
     np.testing.assert_allclose(rho, table.grid.rings.rho(), rtol=1e-12)
-    phi = table.grid.azimuths.angles()
+    phi = table.grid.azimuths.phi()
     u, v = np.cos(phi), np.sin(phi)
     cos, sin = np.cos(told.axis_rad), np.sin(told.axis_rad)
     turns = np.arctan2(cos * v - sin * u, told.stretch * (cos * u + sin * v)) / (2.0 * np.pi)

@@ -1,4 +1,4 @@
-"""Series of exp(i z t): the errors they promise are true bounds, and not far from the errors they make."""
+"""Series of exp(i z t): predicted errors bound the actual ones, and are close to them."""
 
 import numpy as np
 import pytest
@@ -11,21 +11,19 @@ from pipeline.errors import AccuracyError
 from pipeline.optics.light import LaserLine, Light, trapezoid
 from pipeline.surface.heightfield import HeightField
 
-pytestmark = pytest.mark.physics
-
 LASER = trapezoid(Light(illuminant=LaserLine(lambda_nm=500.0)), 1.0)
 T = np.linspace(-1.0, 1.0, 401)
 
 
 def field(half_range_um):
-    """Heights all over +-H."""
+    """Random heights between -H and H."""
     heights = np.random.default_rng(3).random((20, 30))
     heights = (heights - heights.min()) / (heights.max() - heights.min())
     return HeightField(half_range_um * (2.0 * heights - 1.0), (0.1, 0.1))
 
 
 def taylor_error(z, order):
-    """Largest |exp(i z t) - sum_(n <= N) (i z t)^n / n!| on a grid of t, with the rounding of the sum."""
+    """Largest |exp(i z t) - sum_(n <= N) (i z t)^n / n!| on a grid of t, and the rounding error of the sum."""
     x = T.astype(np.longdouble) * np.longdouble(z)
     term = np.ones_like(x, dtype=np.clongdouble)
     total = term.copy()
@@ -37,15 +35,15 @@ def taylor_error(z, order):
     return float(np.max(np.abs(total - exact))), float(rounding)
 
 
-def test_phase_is_of_the_largest_height_at_both_normals():
-    """z = 2 pi / lambda * 2 H: half a wavelength of height range is one pi."""
+def test_phase_is_that_of_the_largest_height_at_normal_incidence():
+    """z = 2 pi / lambda * 2 H: heights that span half a wavelength give pi."""
     assert largest_phase(0.125, 500.0) == pytest.approx(np.pi, rel=1e-15)
 
 
 @settings(max_examples=60, deadline=None)
 @given(half_range_um=st.floats(0.001, 0.4), order=st.integers(1, 60))
-def test_taylor_truncation_is_a_true_bound(half_range_um, order):
-    """No height errs by more than promised; the first term left out alone makes nearly that much."""
+def test_taylor_truncation_bounds_the_error(half_range_um, order):
+    """The error never exceeds the bound, and is nearly as large, because of the first omitted term."""
     z = largest_phase(half_range_um, 500.0)
     plan = plan_taylor(field(half_range_um), LASER, float("inf"), order)
     error, rounding = taylor_error(z, order)
@@ -56,8 +54,8 @@ def test_taylor_truncation_is_a_true_bound(half_range_um, order):
 
 
 @given(half_range_um=st.floats(0.001, 0.1), tolerance=st.floats(1e-4, 1e-1))
-def test_automatic_order_keeps_its_tolerance_without_waste(half_range_um, tolerance):
-    """The error predicted stays within the tolerance, and three terms fewer would break it."""
+def test_automatic_order_is_the_smallest_within_the_tolerance(half_range_um, tolerance):
+    """The predicted error is within the tolerance, and with three terms fewer it would not be."""
     heights = field(half_range_um)
     plan = plan_taylor(heights, LASER, tolerance)
     assert plan.error <= tolerance
@@ -66,15 +64,15 @@ def test_automatic_order_keeps_its_tolerance_without_waste(half_range_um, tolera
 
 @given(half_range_um=st.floats(0.001, 0.4), order=st.integers(1, 60))
 def test_more_height_or_fewer_terms_never_err_less(half_range_um, order):
-    """Truncation grows with the heights and shrinks with the terms once those outrun the phase."""
+    """Truncation grows with the heights, and decreases with the order where that exceeds the phase."""
     here, higher = (plan_taylor(field(f * half_range_um), LASER, float("inf"), order).truncation for f in (1.0, 1.1))
     assert higher >= here
     more = plan_taylor(field(half_range_um), LASER, float("inf"), order + 1).truncation
     assert (more <= here) == (largest_phase(half_range_um, 500.0) <= order + 2) or more == pytest.approx(here)
 
 
-def test_flat_surface_needs_no_terms_and_has_no_error():
-    """Without heights the series is its first term, and float32 keeps it to half a unit in the last place."""
+def test_flat_surface_has_the_lowest_order_and_no_truncation():
+    """The series is its first term, which float32 holds to half a unit in the last place."""
     plan = plan_taylor(HeightField(np.full((4, 5), 3.0), (0.1, 0.1)), LASER, 1e-6)
     assert plan.order == 1
     assert plan.truncation == 0.0
@@ -83,13 +81,13 @@ def test_flat_surface_needs_no_terms_and_has_no_error():
 
 @given(st.floats(0.001, 5.0), st.floats(4.0, 6.0))
 def test_float32_rounding_grows_with_height(half_range_um, factor):
-    """Four times as high loses more, though |P(0)|^2, by which the loss is divided, ripples on the way."""
+    """Heights four times as large lose more, although |P(0)|^2, by which the loss is divided, oscillates."""
     low, high = (float32_rounding(field(f * half_range_um), LASER) for f in (1.0, factor))
     assert 0.4 * 2.0**-24 <= low < high
 
 
 def test_float32_rounding_grows_towards_short_wavelengths():
-    """Blue sees more phase in the same height; red light that no Z receives has a loss all the same."""
+    """The same height is a larger phase for blue; red light, for which Z has no weight, is finite."""
     blue, red = (
         float32_rounding(field(0.2), trapezoid(Light(illuminant=LaserLine(lambda_nm=nm)), 1.0))
         for nm in (420.0, 780.0)
@@ -107,8 +105,8 @@ def test_float32_rounding_grows_towards_short_wavelengths():
     ],
     ids=["too few terms", "too high", "hopeless", "not even close"],
 )
-def test_refusal_predicts_the_error_and_tells_the_way_out(half_range_um, order, remedy):
-    """Where digits would be lost nothing is made: the text has the error, the tolerance and what to change."""
+def test_refusal_predicts_the_error_and_names_the_remedy(half_range_um, order, remedy):
+    """The message states the error, the tolerance and what to change."""
     heights = field(half_range_um)
     with pytest.raises(AccuracyError) as refused:
         plan_taylor(heights, LASER, 1e-4, order)
@@ -132,10 +130,10 @@ def chebyshev_error(z, order):
 
 @settings(max_examples=80, deadline=None)
 @given(z=st.floats(0.0, 300.0), exponent=st.floats(-11.0, -1.0))
-def test_chebyshev_order_keeps_its_tolerance_without_waste(z, exponent):
-    """The truncated Jacobi-Anger sum is within the tolerance everywhere; four terms fewer would break it.
+def test_chebyshev_order_is_the_smallest_within_the_tolerance(z, exponent):
+    """The truncated Jacobi-Anger sum is within the tolerance for all t; with four terms fewer it would not be.
 
-    Rounding: N terms of at most 1, each to 1e-15, their phases n arccos(t) to n 1e-16.
+    Rounding: N terms of at most 1, each accurate to 1e-15, with phases n arccos(t) accurate to n 1e-16.
     """
     tolerance = 10.0**exponent
     order = chebyshev_order(z, tolerance)
@@ -146,7 +144,7 @@ def test_chebyshev_order_keeps_its_tolerance_without_waste(z, exponent):
 
 @given(z=st.floats(0.0, 300.0), dz=st.floats(0.0, 30.0), exponent=st.floats(-12.0, -1.0), more=st.floats(0.0, 3.0))
 def test_chebyshev_order_is_monotone_in_tolerance(z, dz, exponent, more):
-    """A tighter tolerance never needs fewer terms; nor does a larger phase, but for J_n's own ripple."""
+    """A tighter tolerance never needs fewer terms; a larger phase needs at most one fewer, since J_n oscillates."""
     order = chebyshev_order(z, 10.0**exponent)
     assert chebyshev_order(z, 10.0 ** (exponent - more)) >= order
     assert chebyshev_order(z + dz, 10.0**exponent) >= order - 1

@@ -62,7 +62,7 @@ def test_plain_numpy_gives_the_samples(case: Setting) -> None:
     built = case.stack()
     samples = case.samples(case.power_spectrum(built))
     coefficients = plain_numpy.complex_coefficients(built)
-    rho, phi = case.plan.rings.rho(), case.plan.azimuths.angles()
+    rho, phi = case.plan.rings.rho(), case.plan.azimuths.phi()
     for ring, azimuth in ((0, 5), (7, 40), (15, 90), (23, 61)):
         uv = rho[ring] * np.array([np.cos(phi[azimuth]), np.sin(phi[azimuth])])
         found = plain_numpy.polar_texel(built, coefficients, case.rule_of_ring(ring), uv, case.series(ring))

@@ -213,3 +213,11 @@ def test_a_plane_steps_at_its_seams_by_its_whole_rise() -> None:
     slopes = np.tan(np.radians([2.0, 1.0]))
     assert s.inner_step_um == pytest.approx(tuple(0.1 * slopes), rel=1e-9)
     assert s.seam_step_um == pytest.approx((9.9 * slopes[0], 5.9 * slopes[1]), rel=1e-9)
+
+
+def test_seam_energy_is_none_for_a_periodic_surface_and_all_for_a_tilt() -> None:
+    y, x = np.mgrid[0:64, 0:96] * 0.1
+    periodic = np.cos(2.0 * np.pi * x / 3.2) * np.sin(2.0 * np.pi * y / 1.6)
+    assert measure(HeightField(periodic, (0.1, 0.1)), 1.5, 380.0).seam_energy < 0.02
+    assert measure(HeightField(0.1 * x, (0.1, 0.1)), 1.5, 380.0).seam_energy > 0.9
+    assert measure(HeightField(0.0 * x, (0.1, 0.1)), 1.5, 380.0).seam_energy == 0.0

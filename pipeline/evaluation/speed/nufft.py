@@ -84,7 +84,7 @@ def _frequencies(setting: Setting, azimuths: int) -> tuple[Array, Array]:
     """(fx, fy) of all wavelengths of all rings, one ring after the other, (wavelengths, azimuths), 1/um."""
     rings = enumerate(setting.plan.rings.rho())
     r = np.concatenate([rho / (1e-3 * setting.rule_of_ring(ring).lambda_nm) for ring, rho in rings])
-    phi = setting.plan.azimuths.angles()[:azimuths]
+    phi = setting.plan.azimuths.phi()[:azimuths]
     return np.outer(r, np.cos(phi)), np.outer(r, np.sin(phi))
 
 

@@ -212,7 +212,7 @@ class _Suite:
         main, rng = self._main, np.random.default_rng(_SEED)
         rings = np.linspace(1, main.plan.rings.count - 1, self._effort.numpy_nodes).astype(int)
         azimuths = rng.integers(main.plan.azimuths.count, size=len(rings))
-        rho, phi = main.plan.rings.rho()[rings], main.plan.azimuths.angles()[azimuths]
+        rho, phi = main.plan.rings.rho()[rings], main.plan.azimuths.phi()[azimuths]
         uv = np.stack([rho * np.cos(phi), rho * np.sin(phi)], axis=-1)
         # shared by all azimuths of a ring, so not timed
         series = [main.series(ring) for ring in rings]

@@ -47,7 +47,7 @@ def power_spectrum(setting: Setting, built: Stack, made: PolarPowerSpectrum) -> 
 
 def _pairs_in_band(made: PolarPowerSpectrum) -> int:
     """Radii and azimuths of half a turn within the scan's band."""
-    phi = made.azimuths.angles()[: made.azimuths.count // 2]
+    phi = made.azimuths.phi()[: made.azimuths.count // 2]
     fx, fy = (np.abs(np.outer(made.radius_per_um, along)) for along in (np.cos(phi), np.sin(phi)))
     return int(np.count_nonzero((fx <= made.band_per_um[0]) & (fy <= made.band_per_um[1])))
 

@@ -11,10 +11,9 @@ from kernels import device
 from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
-from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.surface import windows
@@ -68,7 +67,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {
             "E": arrays.Named(built.values, ("tile", "r", "s", "lane"), "1"),
             "phi": arrays.Named(
-                np.degrees(built.azimuths.angles()).reshape(-1, built.values.shape[3]), ("tile", "lane"), "degree"
+                np.degrees(built.azimuths.phi()).reshape(-1, built.values.shape[3]), ("tile", "lane"), "degree"
             ),
             "r": arrays.Named(built.radius_per_um, ("r",), "1/um"),
             "s": arrays.Named(built.s_per_um, ("s",), "1/um"),

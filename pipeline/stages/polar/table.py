@@ -9,11 +9,10 @@ import numpy as np
 from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
-from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.polar import power_spectrum
-from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import table_evaluator
@@ -50,7 +49,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {
             "table": arrays.Named(table.values, ("rho", "channel", "w_term", "phi"), "1"),
             "rho": arrays.Named(table.grid.rings.rho(), ("rho",), "1"),
-            "phi": arrays.Named(np.degrees(table.grid.azimuths.angles()), ("phi",), "degree"),
+            "phi": arrays.Named(np.degrees(table.grid.azimuths.phi()), ("phi",), "degree"),
             "wavelengths": arrays.Named(rules.count, ("rho",), "1"),
         },
         {

@@ -8,10 +8,9 @@ import numpy as np
 
 from pipeline.accuracy import certificate
 from pipeline.config.models import Config
-from pipeline.diffraction.upload import kernel_digest
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
 from pipeline.stages.taylor import stack
 from pipeline.store import arrays
 from pipeline.store.store import Artifact

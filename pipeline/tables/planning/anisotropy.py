@@ -1,4 +1,4 @@
-"""Where a surface sends its light, of first order in its height: azimuths crowd there, and probes go there."""
+"""The azimuths into which a surface scatters light, to first order in its height."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -8,27 +8,28 @@ from pipeline.diffraction.dft_stack import Stack
 from pipeline.optics.coherence import sigma_f
 
 _LEAST_STRETCH = 0.3
-_CHANCE = 0.04  # the harmonic that speckle of no direction has
+_NOISE = 0.04  # second azimuthal harmonic of isotropic speckle, measured
 _ANGLE_BINS = 1024
-_MIDDLING_PER_UM = 1.0
+_TYPICAL_RADIUS_PER_UM = 1.0
 
 
 def anisotropy(built: Stack) -> tuple[float, float]:
-    """How azimuths should crowd, (stretch, axis in radians), from where the surface scatters light.
+    """Computes how azimuths should be stretched, from the second azimuthal harmonic of the visible scattered light.
 
-    The second harmonic over azimuth of what is seen of it.
+    built: a Chebyshev stack. Returns the stretch and the axis, radians, of `polar_grid.Azimuths`.
     """
     phi, seen = _scattering(built)
     harmonic = np.sum(seen * np.exp(2j * phi)) / max(float(seen.sum()), np.finfo(float).tiny)
-    one_sided = max(0.0, abs(harmonic) - _CHANCE)
+    one_sided = max(0.0, abs(harmonic) - _NOISE)
     stretch = max(_LEAST_STRETCH, (1.0 - one_sided) / (1.0 + one_sided))
     return float(stretch), float(0.5 * np.angle(harmonic))
 
 
 def _scattering(built: Stack) -> tuple[Array, Array]:
-    """Azimuths of the stack's frequencies, and how much of their light is seen: its cube root, as the eye does.
+    """Computes the azimuths of the stack's frequencies, radians, and the visible light there, both (rows, columns).
 
-    Of first order in the height, and per area of (u, v); without the specular lobe, which is round and says nothing.
+    The light is that of first order in the height, per area of (u, v); its cube root is the response of the eye. The
+    specular lobe, which is isotropic, is excluded.
     """
     power = np.sum(built.coefficients[:, built.column_zero :, :, 1] ** 2, axis=2)
     fy = (np.arange(power.shape[0]) - built.row_zero)[:, None] * built.spacing_per_um[1]
@@ -39,14 +40,18 @@ def _scattering(built: Stack) -> tuple[Array, Array]:
 
 
 def probing_angles(built: Stack, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Azimuths of half a turn to probe, and what each counts for in a mean over all.
+    """Draws azimuths of half a turn for test directions, by stratified importance sampling.
 
-    Half of them go where light goes: a grating's orders lie on one line that even angles would miss.
+    Half of them follow the scattered light, since the orders of a grating lie on a line that evenly spaced azimuths
+    would miss.
+
+    built: a Chebyshev stack. count: number of azimuths. rng: source of random numbers.
+    Returns the azimuths (count,), radians, and their weights (count,) in a mean over all azimuths, of mean 1.
     """
     phi, seen = _scattering(built)
     lit, edges = np.histogram(phi % np.pi, bins=_ANGLE_BINS, range=(0.0, np.pi), weights=seen)
-    # the window gives a line flanks, as wide as its transform is at a middling radius
-    width = sigma_f(built.sigma_um) / _MIDDLING_PER_UM * _ANGLE_BINS / np.pi
+    # the window widens a line; a typical radius sets the angle
+    width = sigma_f(built.sigma_um) / _TYPICAL_RADIUS_PER_UM * _ANGLE_BINS / np.pi
     lit = gaussian_filter1d(lit, width, mode="wrap")
     share = 0.5 / _ANGLE_BINS + 0.5 * lit / max(float(lit.sum()), np.finfo(float).tiny)
     share /= share.sum()

@@ -1,7 +1,7 @@
-"""The smallest polar grid that keeps a budget, by measuring.
+"""The search for the smallest polar grid that keeps an error budget.
 
-Three tables beside probes between their texels tell how the error falls with rings and with azimuths,
-e^2 = a / rings^4 + b / azimuths^4 + c, and their product is made smallest.
+The errors of three tables at test directions give the coefficients of e^2 = a / rings^4 + b / azimuths^4 + c. The
+search minimises rings times azimuths under this model and measures the error of the grids that it proposes.
 """
 
 from functools import cached_property
@@ -18,34 +18,40 @@ from pipeline.tables.planning.probes import Probes
 from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar.layout import PolarLayout
 
-_GRID_SHARE = 0.65  # of the budget, by rings and azimuths as the probes see it
+_GRID_SHARE = 0.65  # share of the budget for the error at the test directions
 _MOST_BYTES = 3 * 2**30
-# a start for the search: the grid that keeps 0.1 on snake scans at sigma = 16.25 um
+# start of the search: the grid that keeps a dE of 0.1 on snake scans with sigma = 16.25 um
 _BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0253, 0.12
 _LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
 _ROUNDS = 6
 _GROWTH = 1.5
-_NEAR = 0.75  # of the target: near enough not to search on
+_NEAR = 0.75  # share of the target above which the search ends
 
 
 class GridSearch:
-    """The search over one surface's grids. What a layout sets stays as it is set."""
+    """The search for the grid of one surface. Numbers of rings and azimuths that the layout sets are kept."""
 
     def __init__(
         self, trial: Trial, layout: PolarLayout, scene: Scene | None, delta_e: float, exposure_ru: float
     ) -> None:
+        """Computes the anisotropy of the surface.
+
+        trial: the first window's stack. layout: numbers that are set. scene: lights and views, None for all.
+        delta_e: mean CIELAB error allowed. exposure_ru: exposure at which it is measured, RU.
+        """
         self._trial, self._bake, self._layout, self._scene = trial, trial.bake, layout, scene
         self._delta_e, self._exposure_ru = delta_e, exposure_ru
         self._rho_max, self._is_line = trial.bake.rho_max, trial.bake.radiometry.light.is_line
         self._stretch, self._axis = anisotropy(trial.stack)
 
     def run(self) -> tuple[Azimuths, Rings, float | None]:
-        """The azimuths and rings chosen, and the mean error at the probes, None where nothing was searched.
+        """Searches for the grid.
 
-        Raises AccuracyError where E would not fit into memory.
+        Returns the azimuths, the rings, and the mean error at the test directions, None if both numbers are set.
+        Raises AccuracyError if E does not fit into memory.
         """
         rings, azimuths = self._start()
-        # what does not fit is refused before anything is measured
+        # a power spectrum that does not fit into memory is refused before any table is measured
         self._require_memory(azimuths)
         error = None
         if "auto" in (self._layout.rings, self._layout.azimuths):
@@ -54,7 +60,7 @@ class GridSearch:
         return self._azimuths(azimuths), self._rings(rings), error
 
     def _start(self) -> tuple[int, int]:
-        """Rings and azimuths to begin with: both follow the window, and the error falls with their square."""
+        """Computes the first numbers of rings and azimuths: the error falls with the square of either."""
         finer = sqrt(_BASE_DELTA_E / self._delta_e)
         window = self._bake.sigma_um / _BASE_SIGMA_UM
         x = asinh(self._rho_max / self._r0)
@@ -73,13 +79,13 @@ class GridSearch:
 
     @property
     def _r0(self) -> float:
-        """Rings are even where the specular lobe's width rules; under a laser line, everywhere."""
+        """Radius below which rings are evenly spaced: about the specular lobe, or all of them for a laser line."""
         widest = 4.0 * self._rho_max
         return widest if self._is_line else min(_BASE_R0 * _BASE_SIGMA_UM / self._bake.sigma_um, widest)
 
     @property
     def _least_rings(self) -> int:
-        """So many that the specular lobe is seen, which random probes hardly meet: its own width apart there."""
+        """Least number of rings: the specular lobe, which few test directions meet, has rings one width apart."""
         lobe = 1e-3 * self._bake.lambda_min_nm * sigma_f(self._bake.sigma_um)
         return max(_LEAST_RINGS, ceil(self._r0 * asinh(self._rho_max / self._r0) / lobe))
 
@@ -90,7 +96,7 @@ class GridSearch:
         return Azimuths(count, self._stretch, self._axis)
 
     def _require_memory(self, azimuths: int) -> None:
-        """Raises AccuracyError where E on this number of azimuths would not fit into memory."""
+        """Raises AccuracyError if E on this number of azimuths does not fit into memory."""
         need = 4 * azimuths * self._bake.s_nodes * len(self._bake.radius_per_um)
         if need > _MOST_BYTES:
             raise AccuracyError(
@@ -100,7 +106,10 @@ class GridSearch:
             )
 
     def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
-        """Rings and azimuths whose error is within the budget at the least product, as far as a model tells."""
+        """Finds the numbers of rings and azimuths with the least product whose error is within the budget.
+
+        rings, azimuths: where the search starts. Returns both numbers and the error at the test directions.
+        """
         target = _GRID_SHARE * self._delta_e
         errors = {}
 
@@ -109,7 +118,7 @@ class GridSearch:
                 errors[r, a] = self._error(r, a)
             return errors[r, a]
 
-        # e^2 = (rings' share) / rings^4 + (azimuths' share) / azimuths^4 + the rest, from three tables
+        # e^2 = by_rings / rings^4 + by_azimuths / azimuths^4 + rest, from three tables
         here = error(rings, azimuths) ** 2
         other_rings = _other(rings, 3 * rings // 4)
         other_azimuths = _other(azimuths, _whole_tiles(3 * azimuths // 4))
@@ -121,18 +130,19 @@ class GridSearch:
         for _ in range(_ROUNDS):
             before, best = best, self._clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25)
             if errors.get(best, 0.0) > target:
-                # the model has nothing more to ask for, and errs: a coarse grid may be better by luck
+                # the model proposes a grid known to miss the target; a coarse grid can have a low error by chance
                 best = self._clipped(_GROWTH * before[0], _GROWTH * before[1])
             if _NEAR * target <= error(*best) <= target:
                 break
             left *= min(4.0, (0.9 * target / error(*best)) ** 2)
-        # what a config sets was varied to measure, not to choose
+        # numbers that the config sets were varied for the model only
         allowed = {pair: errors[pair] for pair in errors if pair == self._clipped(*pair)}
         met = [pair for pair in allowed if allowed[pair] <= target]
         best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(allowed, key=allowed.__getitem__)
         return *best, allowed[best]
 
     def _clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
+        """Rounds and limits numbers of rings and azimuths, and replaces those that the layout sets."""
         layout = self._layout
         return (
             int(np.clip(ceil(rings), self._least_rings, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
@@ -146,21 +156,21 @@ class GridSearch:
         return Probes(self._trial, self._scene, self._exposure_ru)
 
     def _error(self, rings: int, azimuths: int) -> float:
-        """Mean CIELAB error at the probes of a table of this size."""
+        """Measures the mean CIELAB error of a table of this size at the test directions."""
         self._require_memory(azimuths)
         return self._probes.error(self._trial.table(self._azimuths(azimuths), self._rings(rings)))
 
 
 def _other(count: int, coarser: int) -> int:
-    """A second count to measure at: the coarser one, or the double where that is none."""
+    """Chooses a second number for the model: the coarser one, or the double if that is not below `count`."""
     return coarser if coarser < count else 2 * count
 
 
 def _share(growth: float, other: int, here: int) -> float:
-    """c of an error c / n^4 that grows by `growth` from `here` to `other`."""
+    """Computes the coefficient c of a squared error c / n^4 that grows by `growth` from n = here to n = other."""
     return float(max(growth / (other**-4.0 - here**-4.0), 0.0))
 
 
 def _whole_tiles(azimuths: int) -> int:
-    """Tiles that are whole for every fourth azimuth too, so coarser grids need no other gather."""
+    """Rounds up to whole tiles of every fourth azimuth, so that coarser grids are part of the same gather."""
     return 4 * TILE * ceil(azimuths / (4 * TILE))

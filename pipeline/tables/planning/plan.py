@@ -1,7 +1,7 @@
-"""What a polar table is made of, chosen for an error budget: terms, nodes, rings, azimuths, quadrature.
+"""The plan of a polar table for an error budget: numbers of terms, nodes, rings and azimuths, and the quadrature.
 
-What a series needs follows from its tail: Bessel's functions bound Chebyshev's coefficients of every exponential
-(Jacobi-Anger). What the grid needs depends on the surface, so it is searched for.
+Numbers of terms and nodes follow from the tails of the series: Bessel functions are the Chebyshev coefficients of the
+exponential (Jacobi-Anger expansion). The grid depends on the surface and is searched for.
 """
 
 from collections.abc import Sequence
@@ -23,30 +23,35 @@ from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 
-# shares of a budget of dE: what each approximation may leave, as relative amplitude or intensity
-AMPLITUDE_SHARE = 1e-4  # of P, by terms left out and by the window's cut
+# relative error allowed in each approximation, per unit of the budget in dE
+AMPLITUDE_SHARE = 1e-4  # of P, by truncation of the series and by the cut of the window
 _NODES_SHARE = 0.005  # of E, by its nodes in s
-_W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|; of at most 0.1
-_QUADRATURE_SHARE = 3e-3  # of each integral, by its wavelengths
-_LUMINOUS_NM = 545.0  # the middle of D65 under the eye's Y
+_W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|, for a budget of at most 0.1
+_QUADRATURE_SHARE = 3e-3  # of the spectral integral, by its wavelengths
+_LUMINOUS_NM = 545.0  # middle of D65, weighted by ybar
 
 
 @dataclass(frozen=True)
 class Budget:
-    """The mean CIELAB error allowed at an exposure."""
+    """The mean CIELAB error allowed, `delta_e`, at an exposure of `exposure_ru`, RU."""
 
     delta_e: float
     exposure_ru: float
 
     @property
     def quadrature(self) -> float:
-        """Relative error that each ring's wavelengths may leave."""
+        """Relative error allowed in the wavelength quadrature of each ring."""
         return _QUADRATURE_SHARE * self.delta_e
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What was chosen, and the mean error at the probes; None where no grid was searched for."""
+    """The numbers chosen for a polar table.
+
+    terms: Chebyshev terms of the stack. s_nodes: Chebyshev nodes of E in s. w_terms: Chebyshev terms in |w|.
+    azimuths, rings: the grid.
+    probed_delta_e: mean CIELAB error at the test directions; None if the layout sets both numbers of the grid.
+    """
 
     terms: int
     s_nodes: int
@@ -57,11 +62,14 @@ class Plan:
 
     @property
     def texels(self) -> int:
-        """Texels of one output of the table."""
+        """Number of texels of one output of the table."""
         return self.rings.count * self.azimuths.count
 
     def bake(self, radiometry: Radiometry, budget: Budget, layout: PolarLayout) -> PolarBake:
-        """The settings of the bake that this plan is of, under any light of its wavelengths and any material."""
+        """Makes the settings of a bake by this plan.
+
+        radiometry: any light of the planned wavelengths, and any material. budget, layout: those of the plan.
+        """
         light = radiometry.light
         return PolarBake(
             radiometry=radiometry,
@@ -77,7 +85,7 @@ class Plan:
 
 
 def rho_max(scene: Scene | None) -> float:
-    """How far out in (u, v) a table must reach: |wi| + |wr| along the surface, 2 without a scene."""
+    """Computes the largest |(u, v)| of a scene, sin(theta_i) + sin(theta_r); 2 without a scene."""
     if scene is None:
         return RHO_MAX
     view = np.sin(np.radians(scene.views.theta_max_deg))
@@ -93,10 +101,14 @@ def start(
     layout: PolarLayout,
     progress: Progress = silent,
 ) -> Trial:
-    """Fixes all terms and nodes for a budget, and transforms the first window.
+    """Chooses all numbers of terms and nodes for a budget, and transforms the first window.
 
-    fields: height fields of the coherence windows (pipeline.surface.windows), the middle's first.
-    sigma_um: standard deviation of the window, um. light: only its wavelengths count, a range or a line.
+    fields: one height field per position of the window (pipeline.surface.windows), that of the middle first.
+    sigma_um: standard deviation of the window, um. light: the range of wavelengths, or a laser line.
+    scene: lights and views, None for all. budget: the error allowed. layout: numbers that are set.
+    progress: called with the share done.
+    Returns the trial for `choose`. Raises AccuracyError if the samples do not resolve the window or the stack does
+    not fit into memory, and DeviceError if no device works.
     """
     lambda_min, probing = light.lambda_min_nm, _probing_light(light, layout)
     z = expansion.largest_phase(max(field.half_range_um for field in fields), lambda_min)
@@ -117,9 +129,10 @@ def start(
 
 
 def choose(trial: Trial, scene: Scene | None, budget: Budget, layout: PolarLayout) -> Plan:
-    """Searches the smallest grid that keeps a budget on the trial's window.
+    """Searches for the smallest grid that keeps the budget on the trial's window.
 
-    Raises AccuracyError where the power spectrum would not fit into memory.
+    trial: made by `start` with the same scene, budget and layout.
+    Returns the plan. Raises AccuracyError if the power spectrum does not fit into memory.
     """
     azimuths, rings, error = GridSearch(trial, layout, scene, budget.delta_e, budget.exposure_ru).run()
     bake = trial.bake
@@ -127,13 +140,16 @@ def choose(trial: Trial, scene: Scene | None, budget: Budget, layout: PolarLayou
 
 
 def _w_terms(phase: float, light: Light, budget: Budget) -> int:
-    """Terms in |w|, in fours, for k |w| H at the luminous middle: white light's blue end hardly counts."""
+    """Computes the number of terms in |w|, a multiple of 4, for a phase k |w| H at the luminous middle.
+
+    The shorter wavelengths of white light contribute little to the colour error.
+    """
     share = _W_SHARE_OF_A_LINE if light.is_line else _W_SHARE
     return 4 * ceil((expansion.chebyshev_order(phase, share * min(0.1, budget.delta_e)) + 1) / 4)
 
 
 def _probing_light(light: Light, layout: PolarLayout) -> Light:
-    """What the grid is planned under: E serves every illuminant of a range, so equal energy, or else one line."""
+    """Chooses the light for planning: E serves all illuminants, so equal energy over the range, or a laser line."""
     if light.is_line:
         return light
     if layout.form == "spectral":
@@ -142,12 +158,12 @@ def _probing_light(light: Light, layout: PolarLayout) -> Light:
 
 
 def _middle_nm(light: Light) -> float:
-    """The wavelength of a light that the eye weighs most."""
+    """Computes the luminous middle of a light, nm: the wavelength of a laser line, else _LUMINOUS_NM if in range."""
     if light.is_line:
         return light.lambda_min_nm
     return float(np.clip(_LUMINOUS_NM, *light.range_nm))
 
 
 def _spacing(light: Light) -> float:
-    """Distance of E's radii, in sigma_f: an integral over wavelengths averages out what a line shows."""
+    """Chooses the distance of the radii of E, in sigma_f; an integral over wavelengths allows a larger one."""
     return power_spectrum.SPACING_OF_A_LINE if light.is_line else power_spectrum.SPACING

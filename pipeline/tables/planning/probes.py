@@ -1,4 +1,4 @@
-"""Directions between any table's texels, with the exact values there: what a grid leaves is measured at them."""
+"""Test directions of the planner, with exact XYZ, at which the error of a grid is measured."""
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar import table as polar
 
-# rings of probes: of so many that share all directions evenly, the innermost and one of every few beyond. Few
-# directions lie on the flank of the mirror's lobe, and their errors are a hundred times the mean's
+# random directions are sorted by rho and divided into _SHARES rings of equal number, of which the _INNERMOST and one
+# of every _EVERY others are used: few directions lie on the flank of the specular lobe, where errors are a hundred
+# times the mean
 _SHARES, _INNERMOST, _EVERY = 192, 8, 4
 _ANGLES = 64
 _SPARE_W_TERMS = 8
@@ -22,20 +23,25 @@ _SEED = 19991
 
 
 class Probes:
-    """Exact means: from E at the probes' own rings and azimuths, with spare terms in |w|."""
+    """Test directions; their exact XYZ come from E on their own rings and azimuths, with additional terms in |w|."""
 
     def __init__(self, trial: Trial, scene: Scene | None, exposure_ru: float) -> None:
+        """Draws the directions and computes their XYZ.
+
+        trial: the window's stack and settings. scene: lights and views, None for all.
+        exposure_ru: exposure at which colour errors are measured, RU.
+        """
         bake = trial.bake
         half, counts = probing_angles(trial.stack, _ANGLES, np.random.default_rng(_SEED))
-        # angles of half a turn serve its other half as well
+        # the azimuths of half a turn are used in the other half as well
         angles = np.concatenate([half, half + np.pi])
         wi, wr = random_pairs(scene, _SHARES * len(angles), _SEED)
         uvw = geometry.uvw(wi, wr)
         beyond = np.arange(_INNERMOST + _EVERY // 2, _SHARES, _EVERY)
         order = np.argsort(np.hypot(uvw[:, 0], uvw[:, 1])).reshape(_SHARES, len(angles))
         order = order[np.concatenate([np.arange(_INNERMOST), beyond])]
-        stands_for = np.where(np.arange(len(order)) < _INNERMOST, 1, _EVERY)[:, None]
-        # the pairs of a ring share its radius and keep their own w
+        represented = np.where(np.arange(len(order)) < _INNERMOST, 1, _EVERY)[:, None]
+        # the pairs of a ring get its median radius and keep their own w
         rho = np.minimum(np.median(np.hypot(uvw[order, 0], uvw[order, 1]), axis=1), bake.rho_max)
         w = uvw[order, 2]
         along_x, along_y = np.outer(rho, np.cos(angles)), np.outer(rho, np.sin(angles))
@@ -43,18 +49,22 @@ class Probes:
         factor = bake.radiometry.direction_factor(wi[order], wr[order])
         self._factor = factor.reshape(-1, 1)
         self._exact = _exact(trial, half, rho, w).reshape(-1, 3)
-        self._counts = (stands_for * np.tile(counts, 2)).ravel()
+        self._counts = (represented * np.tile(counts, 2)).ravel()
         self._exposure_ru = exposure_ru
 
     def error(self, table: polar.PolarTable) -> float:
-        """Mean CIELAB error of a table."""
+        """Computes the mean CIELAB error of a table over the test directions."""
         found = np.nan_to_num(table.look_up(self._uvw))
         error = delta_e(self._factor * found, self._factor * self._exact, self._exposure_ru)
         return float(np.average(error, weights=self._counts))
 
 
 def _exact(trial: Trial, half_turn: Array, rho: Array, w: Array) -> Array:
-    """XYZ / (C cos ti) (rhos, angles, 3) on rings `rho` at both half turns' angles, for `w` (rhos, angles)."""
+    """Computes XYZ / (C cos ti) from E itself.
+
+    half_turn: azimuths (a,), radians; their opposites follow. rho: (n_rings,). w: (n_rings, 2 a).
+    Returns (n_rings, 2 a, 3).
+    """
     bake = trial.bake
     found = power_spectrum.gather(trial.stack, half_turn, bake.radius_per_um, bake.lambda_min_nm, bake.s_nodes)
     s_max, w_terms = power_spectrum.s_max(bake.lambda_min_nm), bake.w_terms + _SPARE_W_TERMS

@@ -1,4 +1,4 @@
-"""The first coherence window at work: its stack, and its power spectrum on the azimuths last asked for."""
+"""Tables of the first coherence window on several grids, whose errors the planner measures."""
 
 from collections.abc import Sequence
 
@@ -13,34 +13,40 @@ from pipeline.tables.polar.table import PolarTable
 
 
 class Trial:
-    """Makes tables of several grids from one window, to measure their errors.
+    """The stack of the first coherence window, and tables made from it.
 
-    bake: the settings that all of them share, under the light and the grey material of the probes.
-    stack: the window's.
+    bake: the settings that all tables share, with the light and the grey material of the planner.
+    stack: the DFT stack of the window.
     """
 
     def __init__(self, bake: PolarBake, field: HeightField, progress: Progress = silent) -> None:
-        """Transforms the height field of the window."""
+        """Transforms the height field of the window. Raises the errors of `PolarBake.stack`."""
         self.bake = bake
         self.stack = bake.stack(field, progress)
         self._made: PolarPowerSpectrum | None = None
 
     def power_spectrum(self, azimuths: Azimuths) -> PolarPowerSpectrum:
-        """E of the window on these azimuths; the last one is kept, since a search varies rings in between."""
+        """Computes E of the window on the given azimuths.
+
+        The last E is kept, because the search varies the rings between two changes of the azimuths.
+        """
         if self._made is None or self._made.azimuths != azimuths:
-            # releases its memory, which may serve the next one
+            # release the memory first, so that the next E can reuse it
             self._made = None
             self._made = self.bake.power_spectrum(self.stack, azimuths)
         return self._made
 
     def table(self, azimuths: Azimuths, rings: Rings) -> PolarTable:
-        """The table on a grid."""
+        """Makes the table on a grid."""
         return self.bake.table(self.power_spectrum(azimuths), rings, self.bake.rules(rings.rho()))
 
     def mean_power_spectrum(
         self, azimuths: Azimuths, others: Sequence[HeightField], progress: Progress = silent
     ) -> PolarPowerSpectrum:
-        """The mean of E over this window and others, each given by its height field."""
+        """Computes the mean of E over this window and others.
+
+        others: height fields of the other windows. progress: called with the share done of each transform.
+        """
         mean, self._made = self.power_spectrum(azimuths), None
         for field in others:
             mean.values[...] += self.bake.power_spectrum(self.bake.stack(field, progress), azimuths).values

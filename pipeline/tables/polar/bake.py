@@ -1,4 +1,4 @@
-"""The steps from a height field to a polar table, once every number of terms and nodes is fixed."""
+"""The steps from a height field to a polar table, for given numbers of terms and nodes."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,12 +22,13 @@ class PolarBake:
     """The settings of a polar bake, and its steps: stack, power spectrum E, quadratures, table.
 
     radiometry: light, material and coherence window of the tables.
-    lambda_min_nm: shortest wavelength that E serves, nm.
+    lambda_min_nm: shortest wavelength for which E is computed, nm.
     rho_max: |(u, v)| of the outermost ring, dimensionless.
-    spacing: distance of E's radii, in widths sigma_f of the window's transform.
-    terms: Chebyshev terms of the stack. tolerance: of P, in amplitude, by the window's cut.
-    s_nodes, w_terms: nodes of E in s = k |w|, and Chebyshev terms of tables in |w|.
-    quadrature_error: relative error that the wavelengths of each ring may leave.
+    spacing: distance of the radii of E, in widths sigma_f of the window's transform.
+    terms: number of Chebyshev terms of the stack.
+    tolerance: amplitude, relative to its peak, at which the window's transform is cut.
+    s_nodes: number of Chebyshev nodes of E in s = k |w|. w_terms: number of Chebyshev terms of tables in |w|.
+    quadrature_error: relative error allowed in the wavelength quadrature of each ring.
     """
 
     radiometry: Radiometry
@@ -51,21 +52,25 @@ class PolarBake:
         return self.radiometry.sigma_um
 
     def stack(self, field: HeightField, progress: Progress = silent) -> Stack:
-        """Transforms the Chebyshev terms of one window's height field (float32)."""
+        """Transforms the Chebyshev terms of the height field of one window, in float32.
+
+        Raises AccuracyError if the samples do not resolve the window or the stack does not fit into memory, and
+        DeviceError if no device works.
+        """
         reach = float(self.radius_per_um[-1])
         return power_spectrum.chebyshev_stack(field, self.sigma_um, reach, self.terms, self.tolerance, progress)
 
     def power_spectrum(self, stack: Stack, azimuths: Azimuths) -> PolarPowerSpectrum:
-        """Gathers E from a stack, on these azimuths. Raises DeviceError where no device works."""
+        """Computes E from a stack on the given azimuths. Raises DeviceError if no device works."""
         return power_spectrum.build(stack, azimuths, self.radius_per_um, self.lambda_min_nm, self.s_nodes)
 
     def rules(self, rho: Array) -> RingQuadratures:
-        """Chooses the wavelengths of rings at radii `rho` (n_rings,), for `quadrature_error`.
+        """Chooses the wavelengths of rings at radii `rho` (n_rings,), dimensionless, for `quadrature_error`.
 
-        Raises AccuracyError where no step is fine enough.
+        Raises AccuracyError if no step is fine enough.
         """
         return quadrature.choose(self.radiometry.illumination, rho, self.sigma_um, self.quadrature_error)
 
     def table(self, power: PolarPowerSpectrum, rings: Rings, rules: RingQuadratures) -> PolarTable:
-        """Integrates E over the wavelengths of every ring. Raises AccuracyError where memory would not hold it."""
+        """Integrates E over the wavelengths of every ring. Raises AccuracyError if that does not fit into memory."""
         return polar.build(power, rings, rules, self.w_terms, self.radiometry.reflectance)

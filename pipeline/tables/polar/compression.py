@@ -1,15 +1,17 @@
-"""Few textures for a polar table: low rank over channels and terms in |w|, and a range that half floats hold.
+"""Compression of a polar table to few textures: low rank over channels and terms in |w|, for half floats.
 
-A texel's 3 w_terms numbers t are nearly combinations of a few that all texels share:
+The 3 w_terms numbers t of a texel are approximated by combinations of a few vectors that all texels share:
 
     t[c, k] = g(rho) sum_o texture[o] basis[o, c, k]
 
-The basis comes from a singular value decomposition of texels at unit length, for the eye sees ratios: in Lab-like
-opponent channels, over |w| as directions reach it, each ring weighted by how many directions land on it. The
-projection is one matrix for all texels, so textures are as smooth as the table and the same spline interpolates them.
+The basis holds the principal components of the texels: in opponent channels like those of CIELAB, normalised to unit
+length because the eye sees ratios, over the distribution of |w| of random directions, with each ring weighted by the
+share of random directions on it. The projection is one matrix for all texels, so textures are as smooth as the table
+and the same splines interpolate them.
 
-g(rho) = (1 + (rho / radius)^2)^-exponent takes the fall from the mirror direction outwards out of the textures. It
-multiplies after interpolation, so what is interpolated has to be the flattened samples: they are filtered anew.
+The envelope g(rho) = (1 + (rho / radius)^2)^-exponent removes the decay away from the mirror direction from the
+textures. It multiplies after interpolation. Hence the samples are divided by it, and their spline coefficients are
+computed again.
 """
 
 from dataclasses import dataclass, replace
@@ -25,38 +27,44 @@ from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Scene
 from pipeline.tables.polar.table import PolarTable, w_position
 
-CHANNELS = 4  # outputs of one texture: RGBA
+CHANNELS = 4  # outputs per texture: RGBA
 _DIRECTIONS, _SEED = 100_000, 12
-# L*, a*, b* of XYZ near white, without the cube roots
+# CIELAB linearised at white
 _OPPONENT = np.array([[0.0, 1.0, 0.0], [500 / 116 / 0.9505, -500 / 116, 0.0], [0.0, 200 / 116, -200 / 116 / 1.0888]])
-# the least weight of a ring, of their mean: few random directions see the mirror lobe, and everybody looks at it
+# lower limit of a ring's weight, relative to the mean: few random directions lie in the specular lobe, which images
+# show
 _LEAST_RING = 0.1
-# weight of |w| = w_max, light and view side by side: random directions seldom come near, lamps at the camera do
+# weight of |w| = w_max, where light and view have the same direction: random directions are rarely near it, lamps at
+# the camera are
 _AT_W_MAX = 0.05
-# a scene may keep |w| so narrow that the terms' means cannot be told apart
+# regularises the Gram matrix, which a narrow range of |w| in a scene makes singular
 _LEAST_GRAM = 1e-6
 _ENVELOPE_RADII = 64
-# of the brightest ring: darker ones are black at any exposure, and no envelope needs to lift them
+# relative to the brightest ring: darker rings are black at any exposure, and the envelope ignores their level
 _BLACK = 1e-9
 
 
 @dataclass(frozen=True)
 class Envelope:
-    """g(rho) = (1 + (rho / radius)^2)^-exponent."""
+    """The envelope g(rho) = (1 + (rho / radius)^2)^-exponent.
+
+    radius: rho at which the decay begins, dimensionless. exponent: 0 for a constant envelope.
+    """
 
     radius: float = 1.0
     exponent: float = 0.0
 
     def at(self, rho: Array) -> Array:
-        """g (...,) at rho (...,)."""
+        """Computes g (...,) at rho (...,), dimensionless."""
         return np.asarray((1.0 + (rho / self.radius) ** 2) ** -self.exponent)
 
 
 @dataclass(frozen=True)
 class Textures:
-    """A polar table as textures: spline coefficients, to be multiplied by g and a basis after interpolation.
+    """A polar table as textures of spline coefficients; look-ups are multiplied by the basis and the envelope.
 
     values: float32 (rings, outputs, azimuths), outputs a multiple of 4. basis: (outputs, 3, w terms).
+    grid: the rings and azimuths. envelope: g(rho).
     """
 
     values: NDArray[np.float32]
@@ -66,11 +74,11 @@ class Textures:
 
     @property
     def count(self) -> int:
-        """RGBA textures."""
+        """Number of RGBA textures."""
         return int(self.values.shape[1]) // CHANNELS
 
     def table(self) -> PolarTable:
-        """The table that they stand for, over g: its look-up times g(rho) is theirs."""
+        """Reconstructs the polar table, without the envelope; multiply look-ups by `envelope.at(rho)`."""
         outputs, _, terms = self.basis.shape
         flat = self.basis.reshape(outputs, -1).T.astype(np.float32)
         rings, _, azimuths = self.values.shape
@@ -78,12 +86,12 @@ class Textures:
 
 
 def most_textures(table: PolarTable) -> int:
-    """RGBA textures that hold a table as it is."""
+    """Computes how many RGBA textures hold a table without compression."""
     return 3 * table.w_terms // CHANNELS
 
 
 def whole(table: PolarTable) -> Textures:
-    """A table as it is: output o is channel o // w_terms, term o % w_terms."""
+    """Arranges a table as textures without compression: output o is channel o // w_terms, term o % w_terms."""
     rings, channels, terms, azimuths = table.values.shape
     outputs = channels * terms
     values = table.values.reshape(rings, outputs, azimuths)
@@ -91,10 +99,15 @@ def whole(table: PolarTable) -> Textures:
 
 
 def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
-    """The best `textures` RGBA textures for a table under the lights and views of a scene, or under all."""
+    """Compresses a table by the principal components of its texels.
+
+    table: the polar table. textures: number of RGBA textures.
+    scene: lights and views whose directions determine the weights; None for all directions.
+    Returns the textures, with a constant envelope.
+    """
     full, outputs = whole(table), CHANNELS * textures
-    density, gram = _landings(table, scene)
-    # |metric t|^2 is the error seen: opponent channels, mean over |w|
+    density, gram = _weights(table, scene)
+    # |metric t|^2 is the visible error: in opponent channels, mean over |w|
     metric = np.kron(_OPPONENT, np.linalg.cholesky(gram).T)
     moments = sum(
         weight * _unit_moments(metric @ ring.astype(np.float64))
@@ -108,18 +121,18 @@ def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
 
 
 def _unit_moments(texels: Array) -> Array:
-    """sum of t t^T / |t|^2 over texels (outputs, azimuths)."""
+    """Computes the sum of t t^T / |t|^2 over texels (outputs, azimuths)."""
     length = np.linalg.norm(texels, axis=0)
     unit = texels / np.where(length > 0.0, length, 1.0)
     return np.asarray(unit @ unit.T)
 
 
-def _landings(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
-    """Weight of each ring (rings,) and mean of T_k T_l (w terms, w terms), by where random directions land."""
+def _weights(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
+    """Computes the weights of the rings (rings,) and the mean of T_k T_l (w terms, w terms) by random directions."""
     uvw = geometry.uvw(*random_pairs(scene, _DIRECTIONS, _SEED))
     rho = np.hypot(uvw[:, 0], uvw[:, 1])
     rings = table.grid.rings
-    nearest = np.clip(np.rint(rings.index(rho)).astype(int), 0, rings.count - 1)
+    nearest = np.clip(np.rint(rings.ring_from_rho(rho)).astype(int), 0, rings.count - 1)
     landed = np.bincount(nearest, minlength=rings.count).astype(np.float64)
     density = landed * (rings.count / len(rho)) + _LEAST_RING
     cosines = np.cos(np.arange(table.w_terms) * np.arccos(w_position(rho, uvw[:, 2]))[:, None])
@@ -130,7 +143,7 @@ def _landings(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
 
 
 def flattened(textures: Textures) -> Textures:
-    """The same over the envelope that fits them best, for a range that half floats hold."""
+    """Divides textures by the envelope that fits them best, which narrows their range for half floats."""
     rho, nodes = textures.grid.rings.rho(), samples(textures.values)
     envelope = _fit(rho, nodes)
     values = cubic_spline.coefficients(nodes / envelope.at(rho).astype(np.float32)[:, None, None])
@@ -138,18 +151,18 @@ def flattened(textures: Textures) -> Textures:
 
 
 def _fit(rho: Array, nodes: NDArray[np.float32]) -> Envelope:
-    """The envelope nearest, in ratio, to the root mean squares of rings of samples (rings, outputs, azimuths)."""
+    """Fits the envelope to the logarithm of the rings' root mean squares; nodes: (rings, outputs, azimuths)."""
     size = np.sqrt(np.mean(nodes.astype(np.float64) ** 2, axis=(1, 2)))
     if not size.any():
         return Envelope()
     level = np.log(np.maximum(size, _BLACK * size.max()))
-    # over the four rings of a spline g shall vary no faster than what it flattens
+    # the smallest radius spans the four rings of a spline, so that g varies no faster than the samples
     radii = np.geomspace(rho[4], rho[-1], _ENVELOPE_RADII)
     return min((_exponent(rho, level, radius) for radius in radii), key=lambda found: found[0])[1]
 
 
 def _exponent(rho: Array, level: Array, radius: float) -> tuple[float, Envelope]:
-    """What is left of `level` (rings,) under the best exponent for a radius, root mean square, and that envelope."""
+    """Fits the exponent to `level` (rings,) for a radius; returns the rms residual and the envelope."""
     fall = np.log1p((rho / radius) ** 2)
     exponent = -float(np.polyfit(fall, level, 1)[0])
     left = np.std(level + exponent * fall)
@@ -157,9 +170,11 @@ def _exponent(rho: Array, level: Array, radius: float) -> tuple[float, Envelope]
 
 
 def samples(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What spline coefficients (rings, outputs, azimuths) stand for at their nodes: (1, 4, 1) / 6 along both.
+    """Computes the values of a B-spline at its nodes, by (1, 4, 1) / 6 along rings and azimuths.
 
-    Rings go on below the first as the opposite half turn, and are mirrored beyond the last.
+    Rings continue below the first as the opposite half turn, and are mirrored at the last.
+
+    values: spline coefficients, float32 (rings, outputs, azimuths). Returns samples of the same shape.
     """
     around = (np.roll(values, 1, axis=2) + 4.0 * values + np.roll(values, -1, axis=2)) / 6.0
     opposite = np.roll(around[1:2], values.shape[2] // 2, axis=2)

@@ -9,15 +9,15 @@ from pipeline.validated import Validated
 
 
 class PolarLayout(Validated):
-    """Rings and azimuths of splines, Chebyshev polynomials in |w|; what is "auto" follows from [accuracy].
+    """B-splines over rings and azimuths, Chebyshev polynomials in |w|; "auto" values follow from [accuracy].
 
-    form: "spectral" makes the power spectrum fine enough to answer single wavelengths, beside the XYZ of "xyz".
+    form: "xyz", or "spectral", whose power spectrum is also fine enough for single wavelengths.
     """
 
-    # |P|^2 is the mean over the windows that the scan holds, and a metal's reflectance is inside the table
+    # |P|^2 is the mean over all windows of the scan, and a metal's reflectance is part of the table
     averages_windows: ClassVar[bool] = True
     holds_metals: ClassVar[bool] = True
-    # a bundle may keep it in few textures
+    # a bundle may compress the table to few textures
     compresses: ClassVar[bool] = True
 
     layout: Literal["polar"] = "polar"
@@ -29,10 +29,10 @@ class PolarLayout(Validated):
 
     @property
     def integral_step_nm(self) -> float | None:
-        """Step, nm, of the spectral integral; None where every ring has its own."""
+        """Step of the spectral integral, nm; None, since every ring has its own."""
         return None
 
     @property
     def mean_step_nm(self) -> float:
-        """Step, nm, of the means over wavelength that are taken outside the spectral integral."""
+        """Step of the means over wavelength that are taken outside the spectral integral, nm."""
         return FINE_STEP_NM

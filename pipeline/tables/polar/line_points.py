@@ -1,12 +1,13 @@
-"""The points at which the spectral integral takes E, on lines that rings share.
+"""Interpolation points of the spectral integral, on lines of the (r, s) plane that neighbouring rings share.
 
-At a ring rho and a w, wavelengths ask for E at r = rho kappa and s = 2 pi |w| kappa, kappa = 1 / lambda. E is taken
-at points kappa_p, and every wavelength is interpolated from the points about it. Points on radii of E cost half as
-much; the rings near the mirror direction need points between: there, a step of r is a long way in s. Where such
-points would outnumber the wavelengths, as of a tall surface or a laser line, the wavelengths are the points.
+For a ring rho and a w, the wavelengths lie on a line through the origin: r = rho kappa and s = 2 pi |w| kappa, with
+kappa = 1 / lambda. E is evaluated at points kappa_p of the line, and every wavelength is interpolated from the points
+next to it. Points on radii of E cost half as much as others. Rings near the mirror direction need points between the
+radii, because there a step in r is a large step in s. Where these would outnumber the wavelengths, as for a tall
+surface or a laser line, the wavelengths themselves are the points.
 
-Rings that follow each other have the same lines at other w, and share points as long as the line of the first, which
-is the steepest in s, does not leave the s where E is known.
+Consecutive rings have the same lines for different w. They share points as long as the line of the first ring, which
+is the steepest in s, remains in the range of s for which E is known. docs/spectral_operator.md derives this.
 """
 
 from math import pi
@@ -20,24 +21,28 @@ from kernels.spectral_operator import LinePoints
 from pipeline.arrays import Array
 from pipeline.tables.polar.quadrature import RingQuadratures
 
-# how far a step may carry s, in mean distances of E's nodes in s: E cannot turn faster than they follow
+# largest step in s, in mean distances of the Chebyshev nodes of E: they limit how fast E varies
 _STEP_ON_RADII, _STEP_BETWEEN = 0.5, 0.25
-# distances of points between radii, in distances of radii: E there is a polynomial in pieces, not one
+# largest step in r of points between radii, in distances of radii: E is a piecewise polynomial there
 _STEP_IN_RADII = 0.7
-# how far s / s_max may pass 1 at a line's end, and that times nodes^2 = g: the tail of E's series in s grows to
-# cosh(2 sqrt(g)) times what it was, 1500. Lagrange's weight out there is at most 2.4e-3 for the one ring; others of a
-# group only interpolate in w from it. A series of few nodes has a large tail: at g = 16 and a third beyond, 7 nodes
-# lost 4 % of a ring
+# extrapolation limit in s: at s = (1 + eps) s_max the tail of a Chebyshev series of n nodes grows by
+# cosh(2 n sqrt(eps)); eps = min(0.1, 16 / n^2) allows a factor of 1500. The first ring of a group gives such points a
+# Lagrange weight of at most 2.4e-3, and the other rings only interpolate in w from them. With n = 7 and eps = 0.33 a
+# ring lost 4 % (measured)
 _BEYOND, _BEYOND_BY_NODES = 0.1, 16.0
-# the least share of its group's line that a ring may reach: near the rim E vanishes with |w|, but not what the terms
-# leave of a line that reaches further
+# smallest share of the group's line in s that a ring may use: near the rim E vanishes with |w|, but the truncation
+# error of the terms of a longer line does not
 _LEAST_SHARE = 0.5
 
 
 class _Lines:
-    """Every ring's line at its w_max, from its longest wavelength's kappa, `low`, to its shortest's, `high`.
+    """The line of every ring in the (r, s) plane, at the ring's w_max.
 
-    first, last: the radii of E that Lagrange's polynomials of its ends need, `first` negative below the origin.
+    low, high: kappa of the longest and the shortest wavelength (n_rings,), 1/um.
+    first, last: indices of the radii that Lagrange interpolation at the two ends needs; `first` is negative if they
+    include radii mirrored at the origin.
+    kappa_rate: d kappa / d r (n_rings,). rate: points per unit of kappa that E requires (n_rings,), um.
+    on_radii: whether the points are radii of E. on_nodes: whether the points are the wavelengths.
     """
 
     def __init__(
@@ -45,36 +50,38 @@ class _Lines:
     ) -> None:
         self.rho, self.wavelengths, self._radius = rho, quadratures.count, radius_per_um
         self.low, self.high = quadratures.kappa_ends_per_um
-        self.first = _about(radius_per_um, rho * self.low)
-        self.last = _about(radius_per_um, rho * self.high) + ORDER - 1
+        self.first = _first_radius(radius_per_um, rho * self.low)
+        self.last = _first_radius(radius_per_um, rho * self.high) + ORDER - 1
         self._spacing = np.diff(radius_per_um)
-        # what a step of kappa does to s / s_max, and what one of r does to kappa
+        # d (s / s_max) / d kappa and d kappa / d r
         self._share_rate = 2.0 * pi * w_max(rho) / s_max_per_um
         self.kappa_rate = 1.0 / np.maximum(rho, np.finfo(np.float32).tiny)
         self._distances = s_nodes - 1  # of nodes in s
         self._end = 1.0 + min(_BEYOND, _BEYOND_BY_NODES / s_nodes**2)
-        # the rates at which E turns along r and along s add up
+        # the rates of change of E along r and along s add up
         self.rate = rho / (_STEP_IN_RADII * self._spacing[np.abs(self.first)])
         self.rate += self._share_rate * self._distances / _STEP_BETWEEN
-        # off radii a point costs twice as much
+        # a point between radii costs twice as much
         self.on_radii = (
-            (self.first >= 0) & self._followed(self.last) & (self.last + 1 - self.first <= 2 * self.wavelengths)
+            (self.first >= 0) & self._resolved(self.last) & (self.last + 1 - self.first <= 2 * self.wavelengths)
         )
         self.on_nodes = ~self.on_radii & (self.wavelengths <= _steps(self.low, self.high, self.rate)[0])
 
-    def _known(self, r: Array) -> NDArray[np.bool_]:
-        """Whether E is known, or nearly, on the lines out to r."""
+    def _within_limit(self, r: Array) -> NDArray[np.bool_]:
+        """Whether the lines up to r remain within the extrapolation limit in s."""
         return np.asarray(self._share_rate * self.kappa_rate * r <= self._end)
 
-    def _followed(self, radius: np.ndarray) -> NDArray[np.bool_]:
-        """Whether points may go along the lines from radius to radius, out to `radius`."""
+    def _resolved(self, radius: np.ndarray) -> NDArray[np.bool_]:
+        """Whether the radii of E up to index `radius` are close enough along the lines to be the points."""
         step = self._share_rate * self._distances * self.kappa_rate * self._spacing[radius - 1]
-        return np.asarray((step <= _STEP_ON_RADII) & self._known(self._radius[radius]))
+        return np.asarray((step <= _STEP_ON_RADII) & self._within_limit(self._radius[radius]))
 
     def joined_by(self, ring: np.ndarray) -> NDArray[np.bool_]:
-        """Whether a later `ring`, one for every ring, may take what it needs from this one's line."""
+        """Whether a later ring may share the line of each ring; ring: index of the later ring (n_rings,)."""
         reached = np.where(
-            self.on_radii, self._followed(self.last[ring]), self._known(self.rho[ring] * self.high[ring])
+            self.on_radii,
+            self._resolved(self.last[ring]),
+            self._within_limit(self.rho[ring] * self.high[ring]),
         )
         far = _LEAST_SHARE * self._share_rate * self.rho[ring] <= self._share_rate[ring] * self.rho
         alike = (self.on_radii[ring] == self.on_radii) & ~self.on_nodes[ring] & ~self.on_nodes
@@ -84,10 +91,12 @@ class _Lines:
 def choose(
     radius_per_um: Array, s_nodes: int, s_max_per_um: float, rho: Array, quadratures: RingQuadratures
 ) -> LinePoints:
-    """Points of every ring, over all of its wavelengths: of the ways that keep E's digits, the cheapest.
+    """Chooses the interpolation points kappa = 1 / lambda of every ring: the cheapest set that resolves E.
 
-    `radius_per_um` of E ascends from 0, with ORDER / 2 radii beyond the farthest wavelength of every ring; `rho`
-    ascends.
+    radius_per_um: radii of E (n_r,), 1/um, ascending from 0; at least ORDER / 2 of them beyond max(rho) / lambda_min.
+    s_nodes: number of Chebyshev nodes of E in s = 2 pi |w| / lambda. s_max_per_um: end of their interval, 1/um.
+    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. quadratures: wavelengths of every ring.
+    Returns the points of every group of rings; docs/spectral_operator.md derives them.
     """
     lines = _Lines(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
     rings = _groups(lines)
@@ -107,13 +116,13 @@ def choose(
     kappa, of_rho = high[group] - up * step[group], rho[leader][group]
     nodes, on = on_nodes[group], on_radii[group]
     kappa[nodes] = 1.0 / quadratures.lambda_um[(quadratures.first[leader][group] + up)[nodes]]
-    place = np.where(on, first[group] + i, _about(radius_per_um, of_rho * kappa))
+    place = np.where(on, first[group] + i, _first_radius(radius_per_um, of_rho * kappa))
     kappa[on] = radius_per_um[place[on]] / of_rho[on]
     return LinePoints(kappa, place, begin, count, rings, on_radii, on_nodes, stretch)
 
 
 def _groups(lines: _Lines) -> np.ndarray:
-    """How many rings every group has: as many as its first lets join, up to MOST_RINGS."""
+    """Groups consecutive rings that share the line of the first one; returns their numbers, at most MOST_RINGS."""
     rings = len(lines.rho)
     later = np.arange(rings) + np.arange(1, MOST_RINGS)[:, None]
     joined = [np.ones(rings, bool)]
@@ -126,14 +135,14 @@ def _groups(lines: _Lines) -> np.ndarray:
 
 
 def _steps(low: Array, high: Array, rate: Array) -> tuple[np.ndarray, Array]:
-    """How many points between low and high, at least ORDER, and how far apart, E asks for that turns at `rate`."""
-    # the first of so many stays above 0
+    """Computes the number of points from low to high, at least ORDER, and their distance in kappa, for `rate`."""
+    # the term ORDER / high keeps the first point above 0
     step = 1.0 / (rate + ORDER / high)
     return np.maximum(ORDER, np.ceil((high - low) / step).astype(int) + 1), step
 
 
-def _about(radius_per_um: Array, r: Array) -> np.ndarray:
-    """The first of the ORDER radii about r, negative near the origin."""
+def _first_radius(radius_per_um: Array, r: Array) -> np.ndarray:
+    """Finds the first of the ORDER radii about r; negative near the origin, where radii are mirrored."""
     half = ORDER // 2
     below = np.searchsorted(radius_per_um, r, side="right") - 1
     return np.clip(below, 0, len(radius_per_um) - 1 - half) - (half - 1)

@@ -1,9 +1,12 @@
-"""Wavelengths of the spectral integral, chosen ring by ring from an estimate of the error they leave.
+"""The wavelength quadrature of every ring, chosen by an estimate of its error.
 
-|P|^2 along a ray is a Fourier integral over the coherence window's autocorrelation, exp(-x^2 / (4 sigma^2)). At a
-ring rho a rule with weights q_l answers each of its waves with D(x rho) = sum_l q_l exp(2 pi i x rho / lambda_l). In
-speckle all x within the window carry independent amplitudes, so the relative error of the integral is the root
-mean square of D's error over the window. Large rings need fine steps, rings near the mirror direction few.
+Along a ray, |P|^2 is a Fourier integral over the autocorrelation of the coherence window, exp(-x^2 / (4 sigma^2)). On
+a ring rho, a quadrature with weights q_l integrates the wave at lag x to
+
+    D(x rho) = sum_l q_l exp(2 pi i x rho / lambda_l)
+
+In speckle the waves have independent amplitudes, so the relative error of the integral is the root mean square of the
+error of D over the window. Outer rings need small steps; rings near the mirror direction need few wavelengths.
 """
 
 from collections.abc import Callable
@@ -18,7 +21,7 @@ from pipeline.errors import AccuracyError
 from pipeline.optics.light import FINE_STEP_NM, Quadrature
 
 _STEPS_NM = (20.0, 10.0, 5.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
-# the window's autocorrelation squared, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
+# the squared autocorrelation of the window, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
 _REACH_SIGMAS, _POINTS = 4.0, 48
 _GRID_POINTS = 256
 
@@ -26,16 +29,19 @@ _GRID_POINTS = 256
 def choose(
     integrand: Callable[[float], Quadrature], rho: Array, sigma_um: float, tolerance: float
 ) -> RingQuadratures:
-    """The coarsest rule for every ring whose estimated relative error is below `tolerance`.
+    """Chooses for every ring the coarsest quadrature whose estimated relative error is at most `tolerance`.
 
-    `integrand` gives the quadrature of a step in nm (one wavelength, whatever the step, for a laser line). Every rule
-    is scaled to keep the white that 1 nm gives, of which 20 nm miss a hundredth. Raises AccuracyError where even the
-    finest step would err by more.
+    Weights are scaled so that every quadrature integrates white as a step of 1 nm does; 20 nm alone err by 1 %.
+
+    integrand: makes the quadrature for a step in nm; for a laser line it has one wavelength whatever the step.
+    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless.
+    sigma_um: standard deviation of the coherence window, um.
+    Returns the wavelengths and weights of every ring. Raises AccuracyError if the finest step errs by more.
     """
     white = integrand(FINE_STEP_NM)
     if len(white.lambda_nm) == 1:
         return uniform(white, len(rho))
-    steps = (_keeping(white, integrand(step)) for step in _STEPS_NM)
+    steps = (_scaled_to(white, integrand(step)) for step in _STEPS_NM)
     coarse = next(steps)
     x = np.linspace(0.0, _REACH_SIGMAS * sigma_um, _POINTS)
     share = np.exp(-0.5 * (x / sigma_um) ** 2)
@@ -59,34 +65,34 @@ def choose(
     )
 
 
-def _keeping(white: Quadrature, rule: Quadrature) -> Quadrature:
-    """The rule with each channel scaled to the integral that `white` gives it."""
+def _scaled_to(white: Quadrature, rule: Quadrature) -> Quadrature:
+    """Scales each channel of a quadrature to the integral that `white` gives."""
     found, asked = rule.weights.sum(axis=0), white.weights.sum(axis=0)
-    # a channel that sees nothing keeps nothing
+    # avoid 0 / 0 for a channel without weight
     scale = np.divide(asked, found, out=np.ones(3), where=found != 0.0)
     return Quadrature(rule.lambda_nm, rule.weights * scale)
 
 
 def uniform(rule: Quadrature, rings: int) -> RingQuadratures:
-    """The same rule for every ring."""
+    """Assigns one quadrature to every one of `rings` rings."""
     return _assemble([rule], np.zeros(rings, int))
 
 
 def _points(y_max: float, rule: Quadrature) -> int:
-    """Samples of D over [0, y_max] that follow its fastest beat, between the two ends of the light's range."""
+    """Computes how many samples of D on [0, y_max] resolve the beat of the first and the last wavelength."""
     beat = 1e3 / rule.lambda_nm[0] - 1e3 / rule.lambda_nm[-1]
     return max(_GRID_POINTS, int(1.5 * beat * y_max))
 
 
 def _response(rule: Quadrature, y: Array) -> Array:
-    """D(y) of X, Y, Z (len(y), 3), over each channel's integral; `y` in even steps from 0.
+    """Computes D(y) (len(y), 3) of X, Y, Z relative to the channels' integrals, for evenly spaced y from 0.
 
-    A wave at a sum is the product of waves at its parts, which makes the sum over wavelengths a matrix product.
+    exp(i(a + b)) = exp(ia) exp(ib): y is split into coarse offsets and a fine run, so that D(y) is a matrix product.
     """
-    # three channels multiply the waves within a run
+    # this length of the run balances the work, since its waves are multiplied by three channels
     run = ceil(sqrt(len(y) / 3.0))
     starts, within = _waves(rule, y[::run]), _waves(rule, y[:run])
-    # a channel that sees nothing has no error either
+    # avoid 0 / 0 for channels with almost no weight, such as Z under a red laser
     total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
     shared = within[:, None] * (rule.weights / total).T.astype(np.float32)
     found = starts @ shared.reshape(3 * run, -1).T
@@ -94,9 +100,9 @@ def _response(rule: Quadrature, y: Array) -> Array:
 
 
 def _waves(rule: Quadrature, y: Array) -> NDArray[np.complex64]:
-    """exp(2 pi i y / lambda), (len(y), L)."""
+    """Computes exp(2 pi i y / lambda), (len(y), L)."""
     turns = np.outer(y, 1e3 / rule.lambda_nm)
-    # whole turns go first: what is left keeps its digits in single precision, whose sine and cosine are much faster
+    # without whole turns the phase is accurate in single precision, whose sine and cosine are much faster
     turns -= np.rint(turns)
     phase = (2.0 * np.pi * turns).astype(np.float32)
     waves = np.empty(phase.shape, np.complex64)
@@ -105,6 +111,7 @@ def _waves(rule: Quadrature, y: Array) -> NDArray[np.complex64]:
 
 
 def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:
+    """Concatenates the quadratures in use; chosen: index of the quadrature of each ring (n_rings,)."""
     used = sorted(set(chosen.tolist()))
     count = np.array([len(rules[k].lambda_nm) for k in used])
     first = np.concatenate([[0], np.cumsum(count)[:-1]])

@@ -1,7 +1,7 @@
-"""The spectral form of a table: I_lambda(u, v, w) = |P|^2 from E itself, with no integration, for spectral renderers.
+"""The spectral form of a table, for spectral renderers: |P|^2 of single wavelengths, without integration.
 
-I_lambda(u, v, w) = E(rho / lambda, phi, 2 pi |w| / lambda): cubic splines over azimuths, Lagrange's polynomials over
-radii, Chebyshev's over s. One table answers every wavelength from the shortest it was made for.
+I_lambda(u, v, w) = E(rho / lambda, phi, 2 pi |w| / lambda), interpolated by cubic B-splines over azimuths, Lagrange
+polynomials over radii and Chebyshev polynomials over s. It holds for all wavelengths from the shortest one of E on.
 """
 
 from dataclasses import dataclass
@@ -13,15 +13,16 @@ from kernels.chebyshev import chebyshev
 from pipeline.arrays import Array
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 
-_ORDER = 8  # radii about each; four leave ten times the error
+_ORDER = 8  # radii per interpolation; with four the error is ten times as large
 _AT_ONCE = 2048
 
 
 @dataclass(frozen=True)
 class SpectralTable:
-    """E as spline coefficients over azimuths.
+    """The power spectrum as spline coefficients over azimuths.
 
-    values: float32 (azimuths, radii, s terms): Chebyshev coefficients over s of spline coefficients of E.
+    values: float32 (azimuths, radii, s terms): Chebyshev coefficients over s of the spline coefficients of E.
+    source: the power spectrum.
     """
 
     values: NDArray[np.float32]
@@ -29,24 +30,28 @@ class SpectralTable:
 
 
 def build(power: PolarPowerSpectrum) -> SpectralTable:
-    """The spectral table of a power spectrum."""
+    """Makes the spectral table of a power spectrum."""
     tiles, radii, nodes, lanes = power.values.shape
     e = np.moveaxis(power.values, 3, 1).reshape(tiles * lanes, radii, nodes)
     terms, _ = chebyshev(nodes)
     in_s = e @ terms.T.astype(np.float32)
-    # samples of a periodic spline are its coefficients seen through (1, 4, 1) / 6
+    # samples of a periodic B-spline are its coefficients convolved with (1, 4, 1) / 6
     through = (4.0 + 2.0 * np.cos(2.0 * np.pi * np.fft.rfftfreq(len(e)))) / 6.0
     values = np.fft.irfft(np.fft.rfft(in_s, axis=0) / through[:, None, None], len(e), axis=0)
     return SpectralTable(values.astype(np.float32), power)
 
 
 def look_up(table: SpectralTable, uvw: Array, lambda_nm: Array) -> Array:
-    """I_lambda (directions, L) at `uvw` (directions, 3); NaN where E does not reach, 0 beyond the scan's band."""
+    """Computes I_lambda of directions and wavelengths.
+
+    uvw: (directions, 3). lambda_nm: wavelengths (L,), nm.
+    Returns (directions, L): NaN outside the radii and the s of E, 0 beyond the scan's Nyquist limits.
+    """
     lambda_um = 1e-3 * np.asarray(lambda_nm, float)
     shape = len(uvw), len(lambda_um)
     r = np.hypot(uvw[:, 0], uvw[:, 1])[:, None] / lambda_um
     s = 2.0 * np.pi * np.abs(uvw[:, 2])[:, None] / lambda_um
-    azimuth = np.broadcast_to(table.source.azimuths.index(uvw[:, :2])[:, None], shape)
+    azimuth = np.broadcast_to(table.source.azimuths.azimuth_from_uv(uvw[:, :2])[:, None], shape)
     flat = [np.ascontiguousarray(a).ravel() for a in (r, s, azimuth)]
     parts = [_at(table, *(a[first : first + _AT_ONCE] for a in flat)) for first in range(0, len(flat[0]), _AT_ONCE)]
     return np.concatenate(parts).reshape(shape)
@@ -73,7 +78,7 @@ def _at(table: SpectralTable, r: Array, s: Array, azimuth: Array) -> Array:
 
 
 def _lagrange(nodes: Array, r: Array) -> tuple[NDArray[np.intp], Array]:
-    """The first of the nodes about each r (may be negative: mirrored), and the polynomials' weights there."""
+    """Finds the first node about each r, negative if nodes are mirrored at 0, and the weights (len(r), _ORDER)."""
     below = np.clip(np.searchsorted(nodes, r, side="right") - 1, 0, len(nodes) - 2)
     first = np.minimum(below - (_ORDER // 2 - 1), len(nodes) - _ORDER)
     index = first[:, None] + np.arange(_ORDER)
@@ -87,6 +92,6 @@ def _lagrange(nodes: Array, r: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def _spline(t: Array) -> Array:
-    """The cubic B-spline's four weights (..., 4) at fractions t."""
+    """Computes the four weights (..., 4) of the cubic B-spline at fractions t (...,)."""
     u = 1.0 - t
     return np.stack([u**3, 4.0 - 3.0 * t * t * (2.0 - t), 4.0 - 3.0 * u * u * (2.0 - u), t**3], axis=-1) / 6.0

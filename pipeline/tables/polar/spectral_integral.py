@@ -1,4 +1,7 @@
-"""The spectral integral of E(r, phi, s) on rings, under a light, an observer and a reflectance."""
+"""The spectral integral of E(r, phi, s) on rings, for a light, an observer and a reflectance.
+
+docs/spectral_operator.md derives the operator.
+"""
 
 from collections.abc import Callable
 
@@ -12,10 +15,11 @@ from pipeline.optics.brdf import grey
 from pipeline.tables.polar import line_points
 from pipeline.tables.polar.quadrature import RingQuadratures
 
-_MOST_BYTES = 2**32  # of all rings' weights over s: 10 um under the default window need 2 GiB
+_MOST_BYTES = 2**32  # size of the weights over s of all rings: heights of 10 um need 2 GiB for the default window
 
 
-# R (..., L) inside the spectral integral from wavelengths in nm (L,) and cosines of half angles (...,)
+# computes R (..., L), the factor inside the spectral integral, from wavelengths (L,), nm, and cosines of half angles
+# (...,)
 Reflectance = Callable[[Array, Array], Array]
 
 
@@ -28,18 +32,23 @@ def integrate(
     w_terms: int,
     reflectance: Reflectance = grey,
 ) -> NDArray[np.float32]:
-    """XYZ / (C cos ti) as Chebyshev terms of |w|, (rings, 3, w terms, azimuths).
+    """Integrates the power spectrum over wavelengths: XYZ / (C cos ti) = sum_l R_l |P|^2 weights.
 
-    `power` is E as `PolarPowerSpectrum` keeps it; `rho` ascends. Raises AccuracyError where the heights ask
-    for more than memory holds.
+    power: float32 (tiles, n_r, s nodes, 16), the values of a `PolarPowerSpectrum`. radius_per_um: its radii (n_r,),
+    1/um. s_max_per_um: end of the interval of its nodes in s, 1/um.
+    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. quadratures: their wavelengths and weights.
+    w_terms: number of Chebyshev terms in |w|, a multiple of 4. reflectance: R.
+    Returns Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths). Raises AccuracyError if
+    the weights over s do not fit into memory. See docs/spectral_operator.md.
     """
     s_nodes = power.shape[2]
     points = line_points.choose(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
     need = 4 * len(points.place) * s_nodes * w_terms
     if need > _MOST_BYTES:
         raise AccuracyError(
-            f"the spectral integral of these heights would take {need / 2**30:.1f} GiB, more than "
-            f"{_MOST_BYTES >> 30}; lower them (a scan's outliers: surface.clip_percentile), or raise accuracy.delta_e"
+            f"the spectral integral of these heights needs {need / 2**30:.1f} GiB, more than the "
+            f"{_MOST_BYTES >> 30} GiB allowed. Lower the heights (a scan's outliers: surface.clip_percentile) or "
+            "raise accuracy.delta_e."
         )
     reflected = at_nodes(reflectance, rho, spectral_operator.group_w(rho, points, w_terms), quadratures)
     terms = spectral_operator.integrate(power, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
@@ -47,13 +56,16 @@ def integrate(
 
 
 def at_nodes(reflectance: Reflectance, rho: Array, w: Array, quadratures: RingQuadratures) -> NDArray[np.float32]:
-    """R (nodes of all rings' rules, w terms) at every ring's `w` (rings, w terms).
+    """Computes the reflectance at the wavelengths and the nodes in w of every ring.
 
     (u, v, w) = -wi - wr, so cos(half angle) = sqrt(rho^2 + w^2) / 2.
+
+    rho: (n_rings,), dimensionless. w: |w| of the nodes (n_rings, w terms). quadratures: wavelengths of the rings.
+    Returns R (wavelengths of all rings, w terms), ring by ring.
     """
     cos_half = 0.5 * np.hypot(rho[:, None], w)
     found = np.empty((int(quadratures.count.sum()), w.shape[1]), np.float32)
-    # rings that follow each other mostly share a rule
+    # consecutive rings mostly have the same quadrature
     changes = (np.diff(quadratures.first) != 0) | (np.diff(quadratures.count) != 0)
     runs, at = np.split(np.arange(len(rho)), np.flatnonzero(changes) + 1), 0
     for rings in runs:

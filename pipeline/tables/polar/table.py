@@ -1,9 +1,9 @@
-"""The polar table: XYZ of |P|^2 on rings and azimuths, Chebyshev polynomials in |w|, cubic splines between texels.
+"""The polar table: XYZ of |P|^2 on rings and azimuths, by Chebyshev polynomials in |w| and cubic B-splines.
 
 XYZ / (C cos ti) = sum_k T_k(2 |w| / w_max - 1) table[ring, channel, k, azimuth],   w_max = sqrt(4 - rho^2)
 
-where `table` is looked up by bicubic B-splines. On the disc of a ring w reaches no further than w_max, for
-(u, v, w) is the sum of two unit vectors.
+where `table` is interpolated by bicubic B-splines. |w| <= w_max on a ring, because -(u, v, w) is the sum of two unit
+vectors.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.spectral_integral import Reflectance
 
-# at the rim |w| vanishes with w_max: what is divided by stays above float64's rounding of 4 - rho^2
+# at the rim both |w| and w_max vanish: the divisor must exceed the rounding of 4 - rho^2 in float64
 _LEAST_W_MAX = np.sqrt(1e-9)
 
 
@@ -30,7 +30,8 @@ _LEAST_W_MAX = np.sqrt(1e-9)
 class PolarTable:
     """B-spline coefficients on a polar grid.
 
-    values: float32 (rings, 3, w terms, azimuths): X, Y, Z; Chebyshev terms of |w|.
+    values: float32 (rings, 3, w terms, azimuths): X, Y, Z and Chebyshev terms in |w|.
+    grid: the rings and azimuths.
     """
 
     values: NDArray[np.float32]
@@ -38,23 +39,31 @@ class PolarTable:
 
     @property
     def w_terms(self) -> int:
+        """Number of Chebyshev terms in |w|."""
         return int(self.values.shape[2])
 
     def look_up(self, uvw: Array) -> Array:
-        """XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the grid's rings."""
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the rings."""
         rings, azimuths = self.grid.rings, self.grid.azimuths
         rho = np.hypot(uvw[:, 0], uvw[:, 1])
-        ring = rings.index(rho)
-        # rounding may carry a direction of the rim itself past the last ring
+        ring = rings.ring_from_rho(rho)
+        # rounding may place a direction on the rim beyond the last ring
         inside = ring <= rings.count - 1 + 1e-6
-        place = np.clip(ring, 0.0, rings.count - 1.0), azimuths.index(uvw[:, :2]), w_position(rho, uvw[:, 2])
+        place = (
+            np.clip(ring, 0.0, rings.count - 1.0),
+            azimuths.azimuth_from_uv(uvw[:, :2]),
+            w_position(rho, uvw[:, 2]),
+        )
         flat = self.values.reshape(rings.count, -1, azimuths.count)
         found = cubic_spline.look_up(flat, *place).astype(np.float64)
         found[~inside] = np.nan
         return found
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
-        """C cos(ti) (directions,); the table holds a metal's reflectance at every angle, which leaves G and w."""
+        """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3).
+
+        For a metal, whose reflectance at every angle is part of the table, only G and w remain.
+        """
         if radiometry.material.fresnel == "conductor":
             return geometry_factor(radiometry.material, wi, wr)
         return radiometry.direction_factor(wi, wr)
@@ -67,7 +76,12 @@ def build(
     w_terms: int,
     reflectance: Reflectance = grey,
 ) -> PolarTable:
-    """The table of a power spectrum under the light and observer of the quadratures, and a reflectance."""
+    """Makes a table from a power spectrum.
+
+    power: E. rings: those of the table. quadratures: wavelengths and weights of light and observer on every ring.
+    w_terms: number of Chebyshev terms in |w|. reflectance: R inside the integral.
+    Raises AccuracyError if the spectral integral does not fit into memory.
+    """
     rho = rings.rho()
     of = power.values, power.radius_per_um, power.s_max_per_um
     samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
@@ -76,15 +90,22 @@ def build(
 
 
 def w_position(rho: Array, w: Array) -> Array:
-    """x = 2 |w| / w_max - 1 in [-1, 1]."""
+    """Computes the argument of the Chebyshev polynomials, x = 2 |w| / w_max - 1 in [-1, 1], w_max = sqrt(4 - rho^2).
+
+    rho, w: (...,), dimensionless. Returns x (...,).
+    """
     return np.asarray(np.clip(2.0 * np.abs(w) / np.maximum(w_max(rho), _LEAST_W_MAX) - 1.0, -1.0, 1.0))
 
 
 def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quadrature) -> float:
-    """Share of the light (Y weights), over the grid's disc, whose frequencies lie beyond the scan's band."""
-    rho, phi = grid.rings.rho(), grid.azimuths.angles()
+    """Computes the share of the light whose frequencies lie beyond the scan's Nyquist limits.
+
+    grid: the rings and azimuths over whose disc the share is taken. band_per_um: the Nyquist limits (x, y), 1/um.
+    light: wavelengths and weights, of which those of Y count.
+    """
+    rho, phi = grid.rings.rho(), grid.azimuths.phi()
     area = np.outer(rho * np.gradient(rho), np.abs(np.gradient(np.unwrap(phi))))
-    # along each direction the band ends at r = reach, so all wavelengths shorter than rho / reach are lost
+    # along each azimuth the Nyquist limit is r = reach, so wavelengths shorter than rho / reach are lost
     reach = np.minimum(
         band_per_um[0] / np.maximum(np.abs(np.cos(phi)), 1e-12),
         band_per_um[1] / np.maximum(np.abs(np.sin(phi)), 1e-12),

@@ -25,16 +25,17 @@ class TaylorLayout(Validated):
     @field_validator("resolution")
     @classmethod
     def odd(cls, value: int) -> int:
+        """Checks that (u, v) = (0, 0) is a node. Raises ValueError, which pydantic reports."""
         if value % 2 == 0:
             raise ValueError(f"expected an odd number, so that (u, v) = (0, 0) is a node, got {value}")
         return value
 
     @property
     def integral_step_nm(self) -> float | None:
-        """Step, nm, of the spectral integral."""
+        """Step of the spectral integral, nm."""
         return self.step_nm
 
     @property
     def mean_step_nm(self) -> float:
-        """Step, nm, of the means over wavelength that are taken outside the spectral integral: the integral's own."""
+        """Step of the means over wavelength outside the spectral integral, nm: that of the integral."""
         return self.step_nm

@@ -1,4 +1,4 @@
-"""The paper's tables: I_p(u, v), p = 0 .. 2N, in X, Y and Z ([D14] eq. 8-12)."""
+"""The paper's tables I_p(u, v), p = 0 .. 2N, of X, Y and Z ([D14] eq. 8-12)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ _MOST_BYTES = 4 * 2**30
 class TaylorTable:
     """I_p on the grid of pipeline.tables.taylor.grid.
 
-    values: float32 (v, u, channel, p): I_p of X, Y, Z, dimensionless; 0 at nodes not computed.
-    computed: bool (v, u); a node is skipped where no direction, or none of the scene, reaches its cells.
-    unknown: float32 (v, u): share of the light (Y weights) whose frequencies lie beyond the scan's band.
-    power: the grid's exponent a.
+    values: float32 (v, u, channel, p): I_p of X, Y, Z, dimensionless; 0 at nodes that are not computed.
+    computed: bool (v, u); nodes whose cells no direction of the scene reaches are not computed.
+    unknown: float32 (v, u): share of the light (Y weights) whose frequencies lie beyond the scan's Nyquist limits.
+    power: the exponent a of the grid.
     """
 
     values: NDArray[np.float32]
@@ -38,11 +38,12 @@ class TaylorTable:
 
     @property
     def resolution(self) -> int:
+        """Number of nodes along each axis."""
         return int(self.values.shape[0])
 
     @property
     def unknown_share(self) -> float:
-        """Share of the (u, v) disc's area, weighted as light, of which the scan knows nothing."""
+        """Share of the light over the disc of (u, v) whose frequencies lie beyond the scan's Nyquist limits."""
         u = grid.nodes(self.resolution, self.power)
         width = np.gradient(u)
         inside = np.hypot(u[:, None], u) <= grid.U_MAX
@@ -50,9 +51,9 @@ class TaylorTable:
         return float(np.sum(area * self.unknown) / max(np.sum(area), np.finfo(float).tiny))
 
     def look_up(self, uvw: Array) -> Array:
-        """sum_p w^p I_p (directions, 3) at `uvw` (directions, 3), bilinear between nodes.
+        """Computes sum_p w^p I_p (directions, 3) at `uvw` (directions, 3), bilinear between nodes ([D14] eq. 10).
 
-        NaN where a neighbour was not computed: the scene the table was made for does not reach there.
+        It is NaN outside the scene of the table, where a neighbouring node is not computed.
         """
         n = self.resolution
         column, row = (grid.node_index(uvw[:, axis], n, self.power) for axis in (0, 1))
@@ -72,7 +73,7 @@ class TaylorTable:
         return total
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
-        """C cos(ti) (directions,): all that depends on the angles is outside the table."""
+        """Computes C cos(ti) (directions,), with a metal's reflectance, for unit vectors wi, wr (directions, 3)."""
         return radiometry.direction_factor(wi, wr)
 
 
@@ -84,10 +85,15 @@ def build(
     scene: Scene | None = None,
     progress: Progress = silent,
 ) -> TaylorTable:
-    """Tables of a Taylor stack under the light and observer of `quadrature` (weights as the integral has them).
+    """Computes the tables of a Taylor stack ([D14] eq. 8, 11 and 12).
 
-    Only one half plane is computed: heights are real, so I_p(-u, -v) = (-1)^p I_p(u, v). Memory is that of the table
-    and one tile. Raises AccuracyError where the table would not fit.
+    Heights are real, so I_p(-u, -v) = (-1)^p I_p(u, v), and a half plane is enough. Memory is that of the table and
+    one tile of nodes.
+
+    stack: the Taylor stack. quadrature: wavelengths and weights of light, observer and material.
+    resolution: odd number of nodes along each axis. power: the exponent a of the grid.
+    scene: lights and views, None for all. progress: called with the share done.
+    Raises AccuracyError if the table does not fit into memory, and DeviceError if no device works.
     """
     _check_memory(resolution, 2 * stack.terms - 1)
     u = grid.nodes(resolution, power)
@@ -95,7 +101,7 @@ def build(
     half_plane = (u > 0.0) | ((u == 0.0) & (u[:, None] >= 0.0))
     v_index, u_index = np.nonzero((computed | computed[::-1, ::-1]) & half_plane)
     nodes = np.stack([u[u_index], u[v_index]], axis=-1)
-    # a border node may stand a little outside the disc of radius 2, where the stack ends
+    # a border node may lie slightly outside the disc of radius 2, at which the stack ends
     radius = np.maximum(np.hypot(nodes[:, 0], nodes[:, 1]) / grid.U_MAX, 1.0)
     powers = 2 * stack.terms - 1
     values = np.zeros((resolution, resolution, 3, powers), dtype=np.float32)
@@ -110,7 +116,11 @@ def build(
 
 
 def node_values(stack: Stack, quadrature: Quadrature, uv: Array) -> Array:
-    """I_p (nodes, 3, 2 N + 1) in float64 at any (u, v) with u >= 0 and |(u, v)| <= 2."""
+    """Computes I_p without a grid, in float64.
+
+    stack: the Taylor stack. quadrature: wavelengths and weights. uv: (nodes, 2) with u >= 0 and |(u, v)| <= 2.
+    Returns (nodes, 3, 2 N + 1). Raises DeviceError if no device works.
+    """
     return np.concatenate([i_p.copy() for _, i_p in _tiles(stack, quadrature, uv)])
 
 
@@ -119,7 +129,10 @@ def _tiles(stack: Stack, quadrature: Quadrature, uv: Array) -> Iterator[tuple[sl
 
 
 def sum_powers(i_p: Array, w: Array) -> Array:
-    """sum_p w^p I_p ([D14] eq. 10): (..., 3, P) and (...,) -> (..., 3), by Horner's rule in float64."""
+    """Computes sum_p w^p I_p ([D14] eq. 10) by Horner's rule in float64.
+
+    i_p: (..., 3, P). w: (...,). Returns (..., 3).
+    """
     total = np.zeros(i_p.shape[:-1])
     for p in range(i_p.shape[-1] - 1, -1, -1):
         total = total * w[..., None] + i_p[..., p]
@@ -127,8 +140,11 @@ def sum_powers(i_p: Array, w: Array) -> Array:
 
 
 def at_directions(stack: Stack, quadrature: Quadrature, uvw: Array) -> Array:
-    """sum_p w^p I_p (directions, 3) in float64 at `uvw` (directions, 3) themselves, without a grid between."""
-    # I_p(-u, -v) = (-1)^p I_p(u, v): half of (u, v) is enough where w takes the turn's sign
+    """Computes sum_p w^p I_p (directions, 3) at `uvw` (directions, 3) without a grid, in float64.
+
+    Raises DeviceError if no device works.
+    """
+    # I_p(-u, -v) = (-1)^p I_p(u, v): the half plane u >= 0 is enough if w changes its sign with (u, v)
     turn = np.where(uvw[:, 0] < 0.0, -1.0, 1.0)
     return sum_powers(node_values(stack, quadrature, turn[:, None] * uvw[:, :2]), turn * uvw[:, 2])
 
@@ -143,10 +159,9 @@ def _check_memory(resolution: int, powers: int) -> None:
 
 
 def _reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
-    """Nodes at the corners of grid cells that some pair of directions reaches, (v, u).
+    """Finds the nodes at the corners of the grid cells that a pair of directions reaches, bool (v, u).
 
-    All of (u, v) lies in the disc of radius 2; a fixed light on a flat sample reaches only the disc of
-    radius sin(theta_max) about -wi.
+    (u, v) lies in the disc of radius 2; under a fixed light, in the disc of radius sin(theta_max) about -wi.
     """
     if scene is None:
         discs = [((0.0, 0.0), grid.U_MAX)]
@@ -157,7 +172,7 @@ def _reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
     nodes = np.zeros((len(u), len(u)), dtype=bool)
     low, high = u[:-1], u[1:]
     for (cx, cy), radius in discs:
-        # nearest point of each cell to the disc's centre
+        # offset from the disc's centre to the nearest point of each cell
         dx, dy = np.clip(cx, low, high) - cx, np.clip(cy, low, high) - cy
         cells = np.hypot(dx[None, :], dy[:, None]) <= radius
         for rows, columns in (
@@ -171,9 +186,9 @@ def _reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
 
 
 def _unknown(stack: Stack, quadrature: Quadrature, u: Array) -> NDArray[np.float32]:
-    """Share of the Y weight at each node whose frequency lies beyond the scan's band, (v, u)."""
+    """Computes the share of the Y weights at each node whose frequencies lie beyond the Nyquist limits, (v, u)."""
     band_x, band_y = stack.band_per_um
-    # the weight of all wavelengths shorter than |u| / band is lost
+    # the weights of all wavelengths shorter than |u| / band are lost
     shorter = np.concatenate([[0.0], np.cumsum(np.abs(quadrature.weights[:, 1]))])
     shorter /= shorter[-1]
     lost = [np.searchsorted(quadrature.lambda_nm, 1e3 * np.abs(u) / band, side="left") for band in (band_x, band_y)]

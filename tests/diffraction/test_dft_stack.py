@@ -1,4 +1,4 @@
-"""The stack's transforms by two routes, kernel and FFTW, against sums written out and against each other."""
+"""The stack's transforms by two algorithms, kernel and FFTW, against explicit sums and against each other."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SCALE_PER_UM = 1.0 / 0.3
 
 
 def silent(_done):
-    """Nobody listens."""
+    """Ignores progress."""
 
 
 def heights_of(ny, nx):
@@ -23,7 +23,7 @@ def heights_of(ny, nx):
 
 
 def kept_of(ny, nx):
-    """Frequencies beyond half the samples wrap; the reach may be wider than what is asked for."""
+    """Frequencies beyond half the samples wrap; the reach may exceed the highest frequency."""
     return Kept(psi_max=ny // 2 + 2, phi_max=nx // 2, reach=nx // 2 + 3)
 
 
@@ -34,7 +34,7 @@ def terms_of(t, series, terms):
 
 
 def sums(heights, scale, series, kept, terms):
-    """mean(term_n exp(+2 pi i f.x)) by matrices of waves, x and y from the middle sample: (psi, phi, terms)."""
+    """mean(term_n exp(+2 pi i f.x)) (psi, phi, terms) by matrices of waves; x and y count from the middle sample."""
     ny, nx = heights.shape
     psi = np.arange(-kept.psi_max, kept.psi_max + 1)
     phi = np.arange(-kept.reach, kept.phi_max + 1)
@@ -44,10 +44,10 @@ def sums(heights, scale, series, kept, terms):
     return np.einsum("py,nyx,qx->pqn", along_y, term, along_x, optimize=True) / heights.size
 
 
-def by_kernel(heights, scale, series, kept, terms, dtype, told=silent):
+def by_kernel(heights, scale, series, kept, terms, dtype, progress=silent):
     assert series == "chebyshev"
     out = device.empty((*kept.shape, 2, terms), dtype)
-    dft_stack.transform(heights, scale, kept, out, told)
+    dft_stack.transform(heights, scale, kept, out, progress)
     return out[:, :, 0] + 1j * out[:, :, 1]
 
 
@@ -60,36 +60,38 @@ def by_fftw(heights, scale, series, kept, terms, dtype):
 
 @SIZES
 @PRECISIONS
-@pytest.mark.parametrize(("route", "series"), [(by_kernel, "chebyshev"), (by_fftw, "chebyshev"), (by_fftw, "taylor")])
-def test_equals_the_sums_written_out(route, ny, nx, dtype, tolerance, series):
+@pytest.mark.parametrize(
+    ("algorithm", "series"), [(by_kernel, "chebyshev"), (by_fftw, "chebyshev"), (by_fftw, "taylor")]
+)
+def test_transforms_equal_explicit_sums(algorithm, ny, nx, dtype, tolerance, series):
     heights, kept, terms = heights_of(ny, nx), kept_of(ny, nx), 19
-    found = route(heights, SCALE_PER_UM, series, kept, terms, dtype)
+    found = algorithm(heights, SCALE_PER_UM, series, kept, terms, dtype)
     assert np.max(np.abs(found - sums(heights, SCALE_PER_UM, series, kept, terms))) < tolerance
 
 
 @pytest.mark.parametrize(("ny", "nx"), [(360, 288), (257, 331), (243, 500)], ids=lambda n: str(n))
 @PRECISIONS
 def test_the_kernel_and_fftw_agree(ny, nx, dtype, tolerance):
-    """Sizes at which sums take long: composite, prime, one of each oddness; a part of the band is kept."""
+    """At sizes for which sums take long: composite, prime, even and odd; a part of the frequencies is kept."""
     of = heights_of(ny, nx), SCALE_PER_UM, "chebyshev", Kept(psi_max=ny // 5, phi_max=nx // 6, reach=4), 33, dtype
     difference = by_kernel(*of) - by_fftw(*of)
     assert np.max(np.abs(difference)) < tolerance
 
 
-def test_two_hundred_terms_keep_their_digits():
-    """Each vector of terms begins anew, by doubling the order: errors do not grow with the recurrence's length."""
+def test_two_hundred_terms_are_as_accurate_as_few():
+    """The recurrence restarts in each vector of terms by doubling the order, so errors do not grow with the order."""
     heights = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 24))
     heights[0, 0], heights[0, 1] = 1.0, -1.0
-    kept, told = Kept(2, 2, 1), []
-    found = by_kernel(heights, 1.0, "chebyshev", kept, 200, np.float64, told.append)
+    kept, reports = Kept(2, 2, 1), []
+    found = by_kernel(heights, 1.0, "chebyshev", kept, 200, np.float64, reports.append)
     assert np.max(np.abs(found - sums(heights, 1.0, "chebyshev", kept, 200))) < 1e-12
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert reports == sorted(reports)
+    assert reports[-1] == 1.0
 
 
 @pytest.mark.parametrize("cores", [1, 3, 64, None])
 def test_terms_do_not_depend_on_how_many_are_transformed_at_once(monkeypatch, cores):
-    """Nor on a terms' array that is written over as soon as the next term is asked for."""
+    """Nor on the generator overwriting a term's array when the next one is requested."""
     heights, kept, terms = heights_of(30, 28), Kept(7, 6, 3), 11
     expected = by_fftw(heights, SCALE_PER_UM, "taylor", kept, terms, np.float64)
     monkeypatch.setattr("os.cpu_count", lambda: cores)
@@ -101,8 +103,8 @@ def test_terms_do_not_depend_on_how_many_are_transformed_at_once(monkeypatch, co
             yield term
             term[...] = np.nan
 
-    out, told = np.empty((*kept.shape, 2, terms)), []
-    term_transforms.transform(written_over(), kept, out, lambda stage, done: told.append((stage, done)))
+    out, reports = np.empty((*kept.shape, 2, terms)), []
+    term_transforms.transform(written_over(), kept, out, lambda stage, done: reports.append((stage, done)))
     np.testing.assert_array_equal(out[:, :, 0] + 1j * out[:, :, 1], expected)
-    assert told == sorted(told)
-    assert told[-1] == ("stack", 1.0)
+    assert reports == sorted(reports)
+    assert reports[-1] == ("stack", 1.0)

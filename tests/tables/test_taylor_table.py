@@ -1,4 +1,4 @@
-"""The paper's tables against the reference, plain numpy and their own symmetries."""
+"""The paper's tables against the reference and plain numpy; their symmetries and errors."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,10 @@ from tests.support import snake
 TOLERANCE = 1e-4
 
 
-def made(field: HeightField, sigma: float, tolerance: float = TOLERANCE) -> tuple[dft_stack.Stack, Quadrature]:
+def taylor_stack(
+    field: HeightField, sigma: float, tolerance: float = TOLERANCE
+) -> tuple[dft_stack.Stack, Quadrature]:
+    """The stack of a field for a tolerance, and the quadrature of the tables."""
     quadrature = trapezoid(Light(), 5.0)
     order = expansion.plan_taylor(field, quadrature, tolerance).order
     reachable = expansion.W_MAX / 0.38
@@ -41,13 +44,13 @@ FIELDS = {
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_nodes_agree_with_the_reference_on_the_same_wavelengths(name: str) -> None:
-    """float32 tables, summed with w^p: within 1e-4 of the local value or 1e-7 of the mirror at every node tried."""
+    """float32 tables, summed with w^p, are within 1e-4 of the local value or 1e-7 of the mirror at random nodes."""
     field = FIELDS[name]()
-    built, quadrature = made(field, 16.25)
+    built, quadrature = taylor_stack(field, 16.25)
     rng = np.random.default_rng(2)
     u = grid.nodes(501, 5.0)
     uv = np.stack([u[rng.integers(250, 501, 600)], u[rng.integers(0, 501, 600)]], axis=-1)
-    # orders of a grating stand on a line: half of the nodes go there
+    # half of the nodes are on the line that holds the orders of a grating
     uv[::2, 1] = 0.0
     uv = uv[np.hypot(uv[:, 0], uv[:, 1]) < 1.99]
     longest = np.sqrt(4.0 - np.sum(uv**2, axis=1))
@@ -62,7 +65,7 @@ def test_nodes_agree_with_the_reference_on_the_same_wavelengths(name: str) -> No
 
 def test_kernel_agrees_with_the_paper_transcribed_into_numpy() -> None:
     """Eq. 8, 11 and 12 in two languages and two orders of summation."""
-    built, quadrature = made(small(), 2.0)
+    built, quadrature = taylor_stack(small(), 2.0)
     rng = np.random.default_rng(5)
     uv = rng.uniform(-1.3, 1.3, (6, 2))
     uv[:, 0] = np.abs(uv[:, 0])
@@ -71,17 +74,17 @@ def test_kernel_agrees_with_the_paper_transcribed_into_numpy() -> None:
 
 
 def test_opposite_nodes_have_alternating_signs() -> None:
-    """Heights are real: I_p(-u, -v) = (-1)^p I_p(u, v), and the sum at w is then another number."""
-    built, quadrature = made(small(), 2.0)
+    """Heights are real, so I_p(-u, -v) = (-1)^p I_p(u, v)."""
+    built, quadrature = taylor_stack(small(), 2.0)
     table = taylor.build(built, quadrature, 21, 3.0)
     sign = (-1.0) ** np.arange(table.values.shape[3])
-    # at the origin odd powers are zero to rounding, of either sign
+    # at the origin odd powers are zero to rounding, with any sign
     np.testing.assert_allclose(table.values[::-1, ::-1], table.values * sign, rtol=0, atol=1e-15)
 
 
 def test_whole_table_agrees_with_the_reference_in_all_four_quadrants() -> None:
     field = small()
-    built, quadrature = made(field, 2.0)
+    built, quadrature = taylor_stack(field, 2.0)
     table = taylor.build(built, quadrature, 15, 2.0)
     u = grid.nodes(15, 2.0)
     v_index, u_index = np.nonzero(table.computed & (np.hypot(u[:, None], u) < 1.95))
@@ -94,7 +97,7 @@ def test_whole_table_agrees_with_the_reference_in_all_four_quadrants() -> None:
 
 
 def test_look_up_between_nodes_is_bilinear_in_the_grid_coordinate() -> None:
-    built, quadrature = made(small(), 2.0)
+    built, quadrature = taylor_stack(small(), 2.0)
     table = taylor.build(built, quadrature, 15, 2.0)
     t = np.array([0.31, -0.77]) / 7.0 + np.array([2.0, 4.0]) / 7.0
     a, b = (t + 1.0) * 7.0
@@ -107,9 +110,9 @@ def test_look_up_between_nodes_is_bilinear_in_the_grid_coordinate() -> None:
     np.testing.assert_allclose(table.look_up(uvw), expected, rtol=1e-9)
 
 
-def test_a_scene_skips_nodes_and_changes_none_it_keeps() -> None:
-    """A fixed light reaches the disc of radius sin(theta_max) about -wi: the rest is not computed nor answered."""
-    built, quadrature = made(small(), 2.0)
+def test_a_scene_omits_nodes_and_does_not_change_the_others() -> None:
+    """A fixed light reaches the disc of radius sin(theta_max) about -wi; look-ups outside it are NaN."""
+    built, quadrature = taylor_stack(small(), 2.0)
     light = Direction(theta_deg=30.0, phi_deg=90.0)
     scene = Scene(lights=[light], views=Views(theta_max_deg=40.0))
     whole, part = taylor.build(built, quadrature, 41, 2.0), taylor.build(built, quadrature, 41, 2.0, scene)
@@ -122,10 +125,10 @@ def test_a_scene_skips_nodes_and_changes_none_it_keeps() -> None:
         assert np.all(np.isfinite(part.look_up((-wi - wr)[None]))) == reached
 
 
-def test_what_the_scan_does_not_know_is_counted() -> None:
-    """A pitch of 0.2 um knows u <= lambda / 0.4 um: 380 nm beyond u = 0.95 is unknown, 780 nm beyond 1.95."""
+def test_the_share_beyond_the_nyquist_limit_is_reported() -> None:
+    """A pitch of 0.2 um limits u to lambda / 0.4 um: 0.95 for 380 nm and 1.95 for 780 nm."""
     field = HeightField(np.random.default_rng(0).uniform(-0.05, 0.05, (64, 64)), (0.2, 0.2))
-    built, quadrature = made(field, 2.0)
+    built, quadrature = taylor_stack(field, 2.0)
     table = taylor.build(built, quadrature, 201, 1.0)
     u = grid.nodes(201, 1.0)
     at_centre_row = table.unknown[100]
@@ -136,8 +139,8 @@ def test_what_the_scan_does_not_know_is_counted() -> None:
 
 
 @pytest.mark.parametrize("half_range", [0.1, 0.2, 0.3])
-def test_predicted_rounding_foresees_what_float32_does(half_range: float) -> None:
-    """An expected error: the worst of 200 nodes stays within three times of it, and it is no idle bound."""
+def test_predicted_rounding_agrees_with_the_error_of_float32(half_range: float) -> None:
+    """It is an expected error: the largest error of 200 nodes is between 1e-3 and three times of it."""
     rng = np.random.default_rng(4)
     field = HeightField(rng.uniform(-half_range, half_range, (64, 64)), (0.1, 0.1))
     quadrature = trapezoid(Light(), 5.0)
@@ -159,5 +162,5 @@ def test_tall_surfaces_are_refused_with_the_error_and_the_remedy() -> None:
 
 
 def test_too_few_terms_are_refused() -> None:
-    with pytest.raises(AccuracyError, match=r'terms left out .*table.terms = "auto"'):
+    with pytest.raises(AccuracyError, match=r'truncation .*table.terms = "auto"'):
         expansion.plan_taylor(small(), trapezoid(Light(), 5.0), 1e-4, 5)

@@ -1,4 +1,4 @@
-"""Where the texels of a polar table lie, and what splines between them keep."""
+"""The polar table: B-splines between texels, its rim, and the lobe of a mirror in closed form."""
 
 import numpy as np
 import pytest
@@ -6,57 +6,28 @@ from scipy.ndimage import spline_filter1d
 
 from kernels import cubic_spline
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.optics.light import Light, trapezoid
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.table import PolarTable
-
-GRIDS = [Azimuths(64), Azimuths(96, 0.4, 0.3), Azimuths(32, 0.7, -1.5)]
-
-
-@pytest.mark.parametrize("azimuths", GRIDS)
-def test_an_azimuth_is_its_own_index(azimuths: Azimuths) -> None:
-    angles = azimuths.angles()
-    uv = 0.7 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    apart = (azimuths.index(uv) - np.arange(azimuths.count) + 0.5 * azimuths.count) % azimuths.count
-    np.testing.assert_allclose(apart, 0.5 * azimuths.count, atol=1e-9)
+from tests.diffraction.fields import SIGMA, power_spectrum_of
 
 
-@pytest.mark.parametrize("azimuths", GRIDS)
-def test_half_a_turn_is_half_the_azimuths_whatever_the_stretch(azimuths: Azimuths) -> None:
-    angles, half = azimuths.angles(), azimuths.count // 2
-    turned = (angles[half:] - angles[:half]) % (2.0 * np.pi)
-    np.testing.assert_allclose(turned, np.pi, atol=1e-12)
-
-
-def test_stretched_azimuths_crowd_about_their_axis() -> None:
-    angles = Azimuths(128, 0.25, np.radians(30.0)).angles()
-    gap = np.abs(np.angle(np.exp(1j * (np.roll(angles, -1) - angles))))
-    at_axis, across = (np.argmin(np.abs(np.angle(np.exp(1j * (angles - np.radians(d)))))) for d in (30.0, 120.0))
-    assert gap[across] / gap[at_axis] == pytest.approx(16.0, rel=0.1)
-
-
-def test_rings_run_from_zero_to_the_rim_and_are_their_own_index() -> None:
-    rings = Rings(50, 0.1, 1.7)
-    rho = rings.rho()
-    assert (rho[0], rho[-1]) == (0.0, 1.7)
-    np.testing.assert_allclose(rings.index(rho), np.arange(50), atol=1e-9)
-    # even at first, by ratios at last
-    assert (rho[2] - rho[1]) / rho[1] == pytest.approx(1.0, rel=0.02)
-    assert (rho[-1] / rho[-2]) == pytest.approx(rho[-2] / rho[-3], rel=1e-3)
-
-
-def test_spline_coefficients_are_those_of_an_independent_filter() -> None:
+def test_spline_coefficients_equal_those_of_scipy() -> None:
     rng = np.random.default_rng(1)
     samples = rng.random((40, 4, 64), np.float32)
     found = cubic_spline.coefficients(samples.copy())
     around = spline_filter1d(samples.astype(float), 3, axis=2, mode="grid-wrap")
-    # beyond the first ring lies the opposite half turn
+    # rings continue below the first as the opposite half turn
     both = np.concatenate([np.roll(around[:0:-1], 32, axis=2), around])
     expected = spline_filter1d(both, 3, axis=0, mode="mirror")[39:]
     np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
 def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
-    """A table that holds function(u, v) in X, twice it in Y and it times |w| / w_max in Z."""
-    rho, phi = rings.rho()[:, None], azimuths.angles()
+    """A table of function(u, v) in X, twice the function in Y and the function times |w| / w_max in Z."""
+    rho, phi = rings.rho()[:, None], azimuths.phi()
     values = function(rho * np.cos(phi), rho * np.sin(phi))
     samples = np.zeros((rings.count, 12, azimuths.count), np.float32)
     samples[:, 0], samples[:, 4] = values, 2.0 * values
@@ -67,19 +38,20 @@ def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
 
 
 def directions(rho: np.ndarray, phi: np.ndarray, share: float) -> np.ndarray:
+    """(u, v, w) at polar coordinates of (u, v), for |w| = share w_max."""
     return np.stack([rho * np.cos(phi), rho * np.sin(phi), -share * np.sqrt(4.0 - rho**2)], axis=-1)
 
 
 @pytest.mark.parametrize("azimuths", [Azimuths(256), Azimuths(256, 0.6, 0.5)])
-def test_a_smooth_function_comes_back_everywhere_and_at_the_origin(azimuths: Azimuths) -> None:
-    """u is odd through the origin: a table that forgot the opposite half turn would break there."""
+def test_a_smooth_function_is_interpolated_everywhere_and_at_the_origin(azimuths: Azimuths) -> None:
+    """The function is odd in u: without the opposite half turn below the first ring it would err at the origin."""
 
     def function(u, v):
         return np.exp(-(u**2) - 0.5 * (v - 0.2) ** 2) * (2.0 + u)
 
     table = table_of(function, azimuths, Rings(200, 0.1))
     rng = np.random.default_rng(2)
-    # at the rim the spline ends with a flat slope: the last rings keep a digit less
+    # at the rim the spline ends with zero slope, so the last rings are less accurate by a digit
     for rho, tolerance in ((1e-9, 2e-5), (3e-3, 2e-5), (0.02, 2e-5), (0.3, 2e-5), (1.6, 2e-5), (1.9, 3e-4)):
         phi = rng.uniform(-np.pi, np.pi, 400)
         uvw = directions(np.full(400, rho), phi, 0.7)
@@ -90,16 +62,30 @@ def test_a_smooth_function_comes_back_everywhere_and_at_the_origin(azimuths: Azi
         np.testing.assert_allclose(found[:, 2], 0.7 * expected, atol=tolerance)
 
 
-def test_beyond_the_last_ring_nothing_is_known_and_on_it_all() -> None:
+def test_look_ups_are_nan_beyond_the_last_ring_only() -> None:
     table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1, 1.5))
     inside, outside = table.look_up(directions(np.array([1.5, 1.51]), np.zeros(2), 0.5))
     np.testing.assert_allclose(inside, [1.0, 2.0, 0.5], rtol=1e-5)
     assert np.all(np.isnan(outside))
 
 
-def test_the_rim_and_vanishing_w_are_ordinary() -> None:
+def test_look_ups_are_finite_at_the_rim_and_for_vanishing_w() -> None:
     table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1))
     uvw = np.array([[2.0, 0.0, 0.0], [0.0, -2.0, -1e-12], [1.2, 0.0, -1e-300], [0.0, 0.0, -2.0]])
     found = table.look_up(uvw)
     assert np.all(np.isfinite(found))
     np.testing.assert_allclose(found[:, 0], 1.0, rtol=1e-5)
+
+
+def test_the_table_of_a_mirror_is_its_specular_lobe() -> None:
+    """|P|^2 = exp(-(rho / lambda)^2 / sigma_f^2) at every w, which gives the whole table in closed form."""
+    field = HeightField(np.full((100, 100), 3.0), (0.15, 0.15))
+    power = power_spectrum_of(field, Azimuths(32))
+    rings, rule = Rings(120, 0.1), trapezoid(Light(), 5.0)
+    table = polar.build(
+        power, rings, quadrature.uniform(rule, 120), 4, lambda nm, cos: np.ones((*cos.shape, len(nm)))
+    )
+    rho, phi = np.linspace(0.0, 0.3, 40), np.linspace(0.0, 6.0, 40)
+    uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
+    lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)
+    np.testing.assert_allclose(table.look_up(uvw), lobe @ rule.weights, atol=3e-5)

@@ -1,4 +1,4 @@
-"""The reference: closed forms of flat surfaces, and two independent routes to one number."""
+"""The reference: closed forms of flat surfaces, signs, symmetries, and agreement of the two algorithms."""
 
 import numpy as np
 import pytest
@@ -16,17 +16,18 @@ LAMBDA_NM = 550.0
 
 
 def rough(ny: int, nx: int, pitch: tuple[float, float], height: float, seed: int = 3) -> HeightField:
-    """White noise: every frequency, no symmetry."""
+    """White noise, which has all frequencies and no symmetry."""
     return HeightField(np.random.default_rng(seed).uniform(-height, height, (ny, nx)), pitch)
 
 
 def pairs(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Random unit vectors wi and wr (count, 3)."""
     rng = np.random.default_rng(seed)
     theta, phi = np.arccos(rng.uniform(0.1, 1.0, (2, count))), rng.uniform(0, 2 * np.pi, (2, count))
     return geometry.direction(theta[0], phi[0]), geometry.direction(theta[1], phi[1])
 
 
-def test_a_mirror_shows_the_transform_of_its_window() -> None:
+def test_power_of_a_mirror_is_the_transform_of_the_window() -> None:
     """|P|^2 = exp(-|f|^2 / sigma_f^2): a Gaussian lobe of width sigma_f, 1 at its peak."""
     field = HeightField(np.full((160, 160), 7.0), (0.1, 0.1))
     u = np.linspace(-0.1, 0.1, 21)
@@ -37,7 +38,7 @@ def test_a_mirror_shows_the_transform_of_its_window() -> None:
 
 
 def test_a_plane_rising_towards_x_reflects_towards_minus_x() -> None:
-    """Normal incidence on a slope tan(a): the light leaves at 2 a on the other side of the normal."""
+    """At normal incidence on a slope of angle a, the light leaves at 2 a on the other side of the normal."""
     slope = np.tan(np.radians(2.0))
     x = (np.arange(400) - 200) * 0.05
     field = HeightField(np.tile(slope * x, (400, 1)), (0.05, 0.05))
@@ -48,8 +49,8 @@ def test_a_plane_rising_towards_x_reflects_towards_minus_x() -> None:
     assert np.degrees(angles[np.argmax(power)]) == pytest.approx(-4.0, abs=0.11)
 
 
-def test_direct_sum_is_the_sum_over_samples_and_copies_as_written() -> None:
-    """P = sum g p exp(+2 pi i f.x) / sum g over a patch repeated by hand, one sample after the other."""
+def test_direct_sum_equals_an_explicit_sum_over_samples_and_copies() -> None:
+    """P = sum g p exp(+2 pi i f.x) / sum g, by loops over the samples and the copies of the patch."""
     field, sigma = rough(6, 8, (0.3, 0.25), 0.1), 0.8
     uvw = np.array([[0.4, -0.7, -1.3], [-0.9, 0.2, -1.1]])
     copies, k = 5, 2 * np.pi / (1e-3 * LAMBDA_NM)
@@ -87,8 +88,8 @@ def test_direct_sum_is_the_sum_over_samples_and_copies_as_written() -> None:
         "flat",
     ],
 )
-def test_fast_route_agrees_with_the_direct_sum(field: HeightField, sigma: float) -> None:
-    """Jacobi-Anger and the gather against the plain sum, to 1e-9 of the mirror, all wavelengths."""
+def test_reference_agrees_with_the_direct_sum(field: HeightField, sigma: float) -> None:
+    """The Jacobi-Anger expansion and the gather agree with the direct sum to 1e-9 of the mirror."""
     reference = Reference(field, sigma, 380.0)
     wi, wr = pairs(40)
     uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -2.0], [0.0, 0.0, -1e-3], [-1.2, 0.4, -1e-9]]])
@@ -99,8 +100,8 @@ def test_fast_route_agrees_with_the_direct_sum(field: HeightField, sigma: float)
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 35.0], ids=["normal light: opposite views share f", "oblique light"])
-def test_the_lines_of_a_map_agree_with_the_direct_sum(theta_deg: float) -> None:
-    """Views in rows of equal v, whose windows share columns, and some beyond the band: to 1e-9 of the mirror."""
+def test_the_rows_of_a_map_agree_with_the_direct_sum(theta_deg: float) -> None:
+    """Views of equal v share sums over columns; some lie beyond the Nyquist limits. To 1e-9 of the mirror."""
     field, nm = rough(48, 90, (0.23, 0.19), 0.15), np.array([390.0, 391.0, 500.0, 610.0, 780.0])
     wr = Map(15).views()
     uvw = geometry.uvw(np.broadcast_to(geometry.direction(np.radians(theta_deg), 0.3), wr.shape), wr)
@@ -111,8 +112,8 @@ def test_the_lines_of_a_map_agree_with_the_direct_sum(theta_deg: float) -> None:
     assert 0.0 < np.mean(np.isnan(found)) < 0.5
 
 
-def test_what_a_direction_gets_does_not_depend_on_the_others() -> None:
-    """In any order, alone or among many of its line, twice over: the same to rounding."""
+def test_the_power_of_a_direction_does_not_depend_on_the_other_directions() -> None:
+    """In any order, alone or together with others of the same v, and repeated: equal to rounding."""
     reference = Reference(rough(40, 56, (0.1, 0.1), 0.2), 1.5, 380.0)
     rng, nm = np.random.default_rng(4), np.array([420.0, 555.0])
     u, w = rng.uniform(-1.2, 1.2, 90), rng.choice([-1.7, -1.1, -0.4], 90)
@@ -125,8 +126,8 @@ def test_what_a_direction_gets_does_not_depend_on_the_others() -> None:
     np.testing.assert_allclose(together, alone, rtol=1e-9, atol=1e-15)
 
 
-def test_what_is_beyond_the_band_is_left_out_of_an_integral() -> None:
-    """XYZ of a direction whose short wavelengths are unknown is that of the others."""
+def test_frequencies_beyond_the_nyquist_limit_count_as_dark() -> None:
+    """XYZ of a direction is the integral over the wavelengths within the limit."""
     field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Light(), Material()
     wi, wr = np.array([[0.0, 0.0, 1.0]]), geometry.direction(np.array([np.radians(65.0)]), np.array([0.0]))
     rule = trapezoid(light, 1.0)
@@ -139,14 +140,14 @@ def test_what_is_beyond_the_band_is_left_out_of_an_integral() -> None:
 
 
 def test_opposite_views_of_a_map_are_opposite_to_the_last_bit() -> None:
-    """What lets one sum serve two views of a normal light."""
+    """Hence one sum serves two views under a light at normal incidence."""
     for size in (61, 300, 301):
         views = Map(size).views()
         np.testing.assert_array_equal(views[::-1], views * [-1.0, -1.0, 1.0])
 
 
-def test_what_the_window_does_not_see_changes_nothing() -> None:
-    """A step of a micrometre at the patch's rim, ten sigma from the middle: the middle's own range counts."""
+def test_heights_outside_the_window_change_nothing() -> None:
+    """A step of a micrometre at the edge of the patch is ten sigma from the middle; it is cut off."""
     heights = rough(120, 120, (0.1, 0.1), 0.05).heights_um
     stepped = heights.copy()
     stepped[:, :8] += 1.0
@@ -157,7 +158,7 @@ def test_what_the_window_does_not_see_changes_nothing() -> None:
 
 
 def test_a_window_finer_than_the_samples_is_refused() -> None:
-    """Below 1.2 pitches the samples' sum is no longer the window's integral, and fast and plain sums part."""
+    """Below 1.2 pitches the sum over samples differs from the window's integral, and so do the two algorithms."""
     field = rough(32, 32, (0.1, 0.12), 0.05)
     with pytest.raises(AccuracyError, match=r"sigma_um = 0.14 .* at least 1.2 pitches, 0.144 um"):
         Reference(field, 0.14, 380.0)
@@ -175,8 +176,8 @@ def test_a_constant_added_to_the_heights_changes_nothing() -> None:
     np.testing.assert_allclose(after, before, rtol=1e-9)
 
 
-def test_beyond_the_band_nothing_is_claimed() -> None:
-    """A pitch of 0.3 um knows |f| <= 1.67 / um, which 0.55 um light passes at u = 0.917."""
+def test_power_is_nan_beyond_the_nyquist_limit() -> None:
+    """A pitch of 0.3 um limits |f| to 1.67 / um, which light of 0.55 um reaches at u = 0.917."""
     field = rough(32, 32, (0.3, 0.3), 0.1)
     uvw = np.array([[0.90, 0.0, -1.0], [0.93, 0.0, -1.0], [0.0, -0.93, -1.0]])
     for power in (
@@ -186,8 +187,8 @@ def test_beyond_the_band_nothing_is_claimed() -> None:
         np.testing.assert_array_equal(np.isfinite(np.ravel(power)), [True, False, False])
 
 
-def test_exchanging_light_and_view_changes_nothing_but_the_cosine() -> None:
-    """XYZ / cos(ti) is a BRDF: symmetric in its directions, to rounding."""
+def test_the_brdf_is_reciprocal() -> None:
+    """XYZ / cos(ti) is symmetric in light and view, to rounding (Helmholtz)."""
     reference = Reference(rough(64, 64, (0.1, 0.1), 0.15), 2.0, 380.0)
     wi, wr = pairs(200)
     for material in (
@@ -200,8 +201,8 @@ def test_exchanging_light_and_view_changes_nothing_but_the_cosine() -> None:
         np.testing.assert_allclose(there, back, rtol=1e-11)
 
 
-def test_spectral_integral_of_the_fast_route_is_that_of_the_direct_sum() -> None:
-    """The whole chain at 1 nm, both routes, gold."""
+def test_spectral_integrals_of_the_two_algorithms_agree() -> None:
+    """XYZ of gold in steps of 1 nm."""
     field, material = rough(24, 24, (0.1, 0.1), 0.1), Material(fresnel="conductor")
     spectrum = Light(range_nm=(500.0, 560.0))
     wi, wr = pairs(3)
@@ -209,8 +210,8 @@ def test_spectral_integral_of_the_fast_route_is_that_of_the_direct_sum() -> None
     np.testing.assert_allclose(fast, xyz_direct(field, 0.8, spectrum, material, wi, wr), rtol=1e-8)
 
 
-def test_a_mirror_seen_in_its_own_reflection_is_one_ru() -> None:
-    """Y = 1 at normal incidence whatever the material, relative normalisation."""
+def test_a_mirror_at_normal_incidence_has_one_ru() -> None:
+    """Y = 1 for every material in the relative normalisation."""
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
     straight = np.array([[0.0, 0.0, 1.0]])
     for fresnel in ("none", "schlick", "dielectric", "conductor"):
@@ -218,8 +219,8 @@ def test_a_mirror_seen_in_its_own_reflection_is_one_ru() -> None:
         assert xyz[0, 1] == pytest.approx(1.0, abs=1e-12)
 
 
-def test_one_ru_is_a_mirror_in_either_normalisation() -> None:
-    """A perfect mirror's peak BRDF is the unit of exposures: in it, absolute and relative are one for a laser."""
+def test_one_ru_is_a_mirror_in_both_normalisations() -> None:
+    """In units of a perfect mirror's peak, absolute and relative values are equal for a laser line."""
     spectrum, straight = Light(illuminant=LaserLine(lambda_nm=532.0)), np.array([[0.0, 0.0, 1.0]])
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 532.0)
     wi, wr = pairs(20)
@@ -233,12 +234,12 @@ def test_one_ru_is_a_mirror_in_either_normalisation() -> None:
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 40.0])
-def test_absolute_normalisation_gives_a_perfect_mirror_albedo_one(theta_deg: float) -> None:
-    """Integral of f cos(tr) over the lobe is 1 +- 1e-3 for a window of 16 um."""
+def test_absolute_normalisation_gives_a_perfect_mirror_an_albedo_of_one(theta_deg: float) -> None:
+    """The integral of f cos(tr) over the lobe is 1 +- 1e-3 for a window of 16 um."""
     sigma = 16.25
     reference = Reference(HeightField(np.zeros((700, 700)), (0.1, 0.1)), sigma, 500.0)
     wi = geometry.direction(np.radians(theta_deg), 0.3)
-    # the lobe is a few sigma_f lambda wide in (u, v)
+    # the width of the lobe in (u, v) is a few sigma_f lambda
     axis = np.linspace(-6, 6, 81) * sigma_f(sigma) * 0.5
     du = axis[1] - axis[0]
     x, y = np.meshgrid(axis - wi[0], axis - wi[1])

@@ -1,0 +1,75 @@
+"""The planner: grids that follow the budget, the scene, the settings of a config and the surface's anisotropy."""
+
+import numpy as np
+import pytest
+
+from pipeline.accuracy import certificate
+from pipeline.diffraction import power_spectrum
+from pipeline.optics import geometry
+from pipeline.surface.heightfield import HeightField
+from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.planning import anisotropy as scattering
+from tests.tables.planned import SIGMA, config, exact_of, planned
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_finer_budget_costs_more_texels_and_nodes() -> None:
+    rough, fine = (planned(config(accuracy={"delta_e": e}))[1] for e in (2.0, 0.1))
+    assert fine.texels > 2 * rough.texels
+    assert fine.s_nodes >= rough.s_nodes
+
+
+def test_numbers_that_a_config_sets_are_kept() -> None:
+    found = config(table={"rings": 20, "azimuths": 160, "w_terms": 4, "terms": 20})
+    table, chosen = planned(found)
+    assert (chosen.rings.count, chosen.azimuths.count, chosen.w_terms) == (20, 160, 4)
+    assert chosen.terms == 20
+    assert chosen.probed_delta_e is None
+    assert table.values.shape == (20, 3, 4, 160)
+
+
+def test_one_number_is_kept_while_the_other_is_searched() -> None:
+    _, chosen = planned(config(table={"rings": 36}, accuracy={"delta_e": 1.0}))
+    assert chosen.rings.count == 36
+    _, chosen = planned(config(table={"azimuths": 320}, accuracy={"delta_e": 1.0}))
+    assert chosen.azimuths.count == 320
+    assert chosen.probed_delta_e is not None
+
+
+def test_the_plan_of_a_flat_mirror_keeps_its_budget() -> None:
+    recipe = {"kind": "mirror", "size_um": 6.4, "pitch_um": 0.1}
+    found = config(surface={"recipe": recipe}, coherence={"sigma_um": 1.6}, accuracy={"delta_e": 0.5})
+    table, _ = planned(found)
+    assert certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found).measured <= 0.5
+
+
+def test_a_scene_bounds_the_rings() -> None:
+    scene = {"lights": [{"theta_deg": 30}], "views": {"theta_max_deg": 40}}
+    found = config(scene=scene)
+    table, chosen = planned(found)
+    reach = np.sin(np.radians(30.0)) + np.sin(np.radians(40.0))
+    assert chosen.rings.rho_max == pytest.approx(reach)
+    wi = geometry.direction(np.radians([30.0, 80.0]), 0.0)
+    wr = geometry.direction(np.radians([39.9, 80.0]), 0.0)
+    assert list(np.isfinite(table_evaluator(table, found.radiometry)(wi, wr)).all(axis=-1)) == [True, False]
+    certificate.certify(table_evaluator(table, found.radiometry), exact_of(found), found)
+
+
+def test_the_stretch_follows_the_axis_of_a_grating() -> None:
+    y, x = np.mgrid[-60:60, -60:60] * 0.1
+    for angle in (0.0, 35.0, 90.0):
+        along = x * np.cos(np.radians(angle)) + y * np.sin(np.radians(angle))
+        field = HeightField(0.05 * np.cos(2.0 * np.pi * along / 1.2), (0.1, 0.1))
+        stretch, axis = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
+        apart = np.angle(np.exp(2j * (axis - np.radians(angle)))) / 2.0
+        assert abs(np.degrees(apart)) < 2.0
+        # the seams of a rotated grating scatter too
+        assert stretch < 0.65
+
+
+def test_an_isotropic_surface_is_not_stretched() -> None:
+    rng = np.random.default_rng(4)
+    field = HeightField(rng.normal(0.0, 0.03, (120, 120)), (0.1, 0.1))
+    stretch, _ = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
+    assert stretch > 0.95
