@@ -8,18 +8,19 @@ PACKAGES = ("cli", "pipeline", "kernels")
 
 
 def sources(*places):
-    """Python files below folders of the project, or the files themselves."""
+    """Yields the Python files below folders of the project, or the files themselves."""
     for place in places:
         path = ROOT / place
         yield from sorted(path.rglob("*.py")) if path.is_dir() else [path]
 
 
 def tree(path):
+    """Parses a file."""
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
 def imported(nodes):
-    """Full names of the modules that import statements among the nodes may load."""
+    """Returns the full names of modules that import statements among the nodes may load."""
     names = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -31,13 +32,15 @@ def imported(nodes):
 
 
 def anywhere(path):
+    """Returns the names that a file imports, in its functions as well."""
     return imported(ast.walk(tree(path)))
 
 
 def within(names, *packages):
-    """Those of the names that are one of the packages or lie in it."""
+    """Selects the names that are one of the packages or lie in it."""
     return {name for name in names if any(name == p or name.startswith(f"{p}.") for p in packages)}
 
 
 def relative(path):
+    """Returns a path from the project's root, with slashes."""
     return path.relative_to(ROOT).as_posix()

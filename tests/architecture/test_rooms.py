@@ -9,8 +9,6 @@ import pytest
 from .source import PACKAGES, ROOT, imported, relative, sources, tree
 
 PAGE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-# modules of pipeline/ that are rooms of their own; the package's own file only hands on the names of api.py
-MODULE_ROOMS = {"api": "api", "__init__": "api", "layouts": "layouts"}
 # files and folders that the page names and a run makes
 MADE = {"tmp/", "out/", "artifact.json"}
 # folders below which the page names a path without repeating them
@@ -19,16 +17,21 @@ PATH = re.compile(r"`([A-Za-z_][\w/.*-]*(?:/|\.(?:py|cl|glsl|md|toml|csv|json)))
 
 
 def room_of(module):
-    """The room of a module's full name; modules of pipeline/ that lie in no folder are the room "pipeline"."""
+    """Returns the room of a module's full name, or of a name in it."""
     package, _, rest = module.partition(".")
-    first = rest.partition(".")[0] or "__init__"
-    if package != "pipeline" or (ROOT / "pipeline" / first).is_dir():
-        return first if package == "pipeline" else package
-    return MODULE_ROOMS.get(first, "pipeline")
+    if package != "pipeline":
+        return package
+    first = rest.partition(".")[0]
+    if (ROOT / "pipeline" / first).is_dir() and first:
+        return first
+    if not (ROOT / "pipeline" / f"{first}.py").exists() or first in ("api", "__init__"):
+        # the package itself, or a name of the public API that it hands on
+        return "api"
+    return "layouts" if first == "layouts" else "pipeline"
 
 
 def loaded(node):
-    """All nodes below a node that run: imports for type checkers alone do not count."""
+    """Yields all nodes below a node that may run: not the imports for type checkers alone."""
     for child in ast.iter_child_nodes(node):
         if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
             yield child
@@ -36,7 +39,7 @@ def loaded(node):
 
 
 def arrows():
-    """The rooms that each room imports, anywhere in its files."""
+    """Finds the rooms that each room imports, anywhere in its files."""
     found = {}
     for path in sources(*PACKAGES):
         room = room_of(relative(path).removesuffix(".py").replace("/", "."))
@@ -48,7 +51,7 @@ def arrows():
 
 
 def picture():
-    """The page's picture: the rooms that each room imports, from the top down."""
+    """Parses the page's picture: the rooms that each room imports, from the top down."""
     block = re.search(r"^```text\n(cli +->.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
     assert block is not None
     # an indented line continues the one above it
@@ -63,7 +66,7 @@ def test_a_package_is_the_room_of_its_modules():
         "layouts",
         "pipeline",
     ]
-    assert room_of("pipeline.api.Bundle") == room_of("pipeline") == "api"
+    assert room_of("pipeline.api.Bundle") == room_of("pipeline.bake") == room_of("pipeline") == "api"
 
 
 def test_the_picture_is_what_the_imports_say():
@@ -89,7 +92,7 @@ def test_every_path_exists(path):
 
 
 def entries():
-    """The text about each folder of the page's list of folders."""
+    """Parses the page's list of folders: the text about each."""
     block = re.search(r"^```text\n(cli/ .*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
     assert block is not None
     parents, found = [], {}
@@ -105,12 +108,12 @@ def test_the_folders_hold_the_files_that_are_listed(folder, text):
     for name in re.findall(r"\w+(?:/|\.(?:py|cl|glsl|md)\b)", text):
         assert (folder / name).exists() or (ROOT / name).exists(), f"{relative(folder)}/{name}"
     for found in folder.iterdir():
-        if folder.parts[len(ROOT.parts)] in PACKAGES and found.is_dir() and found.name != "__pycache__":
-            assert found in entries() or f"{found.name}/" in text
+        if folder.parts[len(ROOT.parts)] in PACKAGES and any(file.suffix != ".pyc" for file in found.rglob("*.*")):
+            assert found in entries() or f"{found.name}/" in text, f"{relative(found)} is not listed"
 
 
 def test_every_test_named_exists():
-    """A row that names a test by its function names the file that holds it."""
+    """An entry that names a test function names the file that defines it."""
     named = re.findall(r"`(tests/[\w/]+\.py)`:? `(test_\w+)`", PAGE)
     assert named
     for file, function in named:
