@@ -38,7 +38,7 @@ class BundleTables:
         return np.concatenate([np.empty((0, 3)), *found])
 
     def c_cos(self, wi: Array, wr: Array) -> Array:
-        """C cos(ti) = (R / divisor)^exponent (1 + wi.wr)^2 / (cos(tr) w^2), times V-cavity shadowing."""
+        """Computes C cos(ti) = (R / divisor)^exponent (1 + wi.wr)^2 / (cos(tr) w^2), times V-cavity shadowing."""
         material = self.manifest["material"]
         dot, w = np.sum(wi * wr, axis=-1), -wi[:, 2] - wr[:, 2]
         cos_half = np.sqrt(np.clip(0.5 * (1.0 + dot), 0.0, 1.0))
@@ -50,7 +50,7 @@ class BundleTables:
         return np.asarray(factor)
 
     def reflectance(self, cos: Array) -> Array:
-        """R(cos_half): Schlick's term, Fresnel's |r|^2 averaged over the samples of n + ik, or 1 without either."""
+        """Computes R(cos_half): Schlick's term, Fresnel's |r|^2 averaged over the samples of n + ik, or 1."""
         f0, samples = self.manifest["material"]["schlick_f0"], self.manifest["material"]["samples"]
         if f0 is not None:
             return np.asarray(f0 + (1.0 - f0) * (1.0 - cos) ** 5)

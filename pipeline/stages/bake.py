@@ -30,7 +30,7 @@ class Results:
 
     @property
     def missed_budget(self) -> str | None:
-        """The error message of a missed error budget; None where it is met or none is set."""
+        """Returns the error message of a missed error budget; None where it is met or none is set."""
         budget: dict[str, Any] = self.artifacts["validate"].summary["budget"]
         if budget["met"] is not False:
             return None
