@@ -38,8 +38,8 @@ def transform(
 ) -> NDArray[Any]:
     """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(T_n(scale h) exp(+2 pi i f.x)).
 
-    x and y count from the middle sample. `done` is called with the share of terms that is made. Terms are made in double:
-    a recurrence in single precision would lose n^2 of its digits at |t| = 1.
+    x and y count from the middle sample. `done` is called with the completed share of terms. Terms are computed in
+    double: a recurrence in single precision would lose n^2 of its digits at |t| = 1.
     """
     ny, nx = heights_um.shape
     lanes, terms = _VECTOR_BYTES // out.dtype.itemsize, out.shape[3]

@@ -1,4 +1,4 @@
-"""The registry of table layouts: the settings that a config may give, and the stages of each, loaded on demand."""
+"""The registry of table layouts: the classes of [table], and the stages of each, which are loaded on demand."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +19,7 @@ NAMES = ("polar", "taylor")
 
 
 def _default_layout(table: Any) -> Any:
-    """A [table] that names no layout is polar."""
+    """Adds the layout "polar" to a section [table] that names none."""
     return {"layout": "polar", **table} if isinstance(table, dict) else table
 
 
@@ -29,6 +29,6 @@ TableSettings = Annotated[
 
 
 def of(table: PolarLayout | TaylorLayout) -> "Layout":
-    """The stages of a table's layout."""
+    """Returns the stages of a layout, for a config's section [table]."""
     found: Layout = import_module(_STAGES[type(table)]).LAYOUT
     return found

@@ -1,1 +1,1 @@
-"""What every bake measures: certificate, checks and convergence."""
+"""Errors that every bake measures against the exact reference: certificate, checks and convergence."""

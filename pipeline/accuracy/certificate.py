@@ -1,7 +1,8 @@
-"""The certificate of a table: its errors on directions that its planning never saw.
+"""The certificate of a table: its errors on directions that its planning did not use.
 
-The reference shares none of the table's approximations: a float64 stack with spare terms, gathered directly at every
-direction and every nanometre. It is checked itself, in every bake, against sums over samples on a few directions.
+The reference shares no approximation with the table: it gathers a float64 stack with more terms than needed, directly
+at every direction and every nanometre. Every bake compares the reference itself with sums over samples, on a few
+directions.
 """
 
 from dataclasses import dataclass, replace
@@ -34,9 +35,9 @@ _SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
 @dataclass(frozen=True)
 class Certificate:
-    """The errors of a table on random directions, and the budget that it has to keep.
+    """The errors of a table on random directions, and its error budget.
 
-    delta_e: mean CIELAB error allowed; None where no budget is set. exposure_ru: exposure of both, RU.
+    delta_e: allowed mean CIELAB error; None where no budget is set. exposure_ru: exposure of both errors, RU.
     measured: mean CIELAB error at `exposure_ru`. random: the table against the reference on random directions.
     reference: the reference against sums over samples.
     """
@@ -53,8 +54,11 @@ def measure(
 ) -> Certificate:
     """Measures a table against the exact reference of its height field, and the reference against plain sums.
 
-    evaluate: the table's XYZ for pairs of directions. Raises AccuracyError where the two algorithms of the reference
-    differ.
+    evaluate: computes the table's XYZ for pairs of directions. reference: of the height field.
+    config: its light, material, scene and [accuracy] are read.
+    progress: called with a step's name and its completed share, 0 to 1.
+    Returns the certificate, with the budget that [accuracy] sets.
+    Raises AccuracyError where the two algorithms of the reference differ.
     """
     checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(evaluate, reference, config, progress)
@@ -65,31 +69,39 @@ def measure(
 def certify(
     evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> Certificate:
-    """Measures a table that was planned for a budget. Raises AccuracyError where it misses it."""
+    """Measures a table that was planned for an error budget, as `measure` does, and enforces the budget.
+
+    Returns the certificate, with the budget of the plan.
+    Raises AccuracyError where the table misses it, or where the two algorithms of the reference differ.
+    """
     found = replace(measure(evaluate, reference, config, progress), delta_e=config.budget_delta_e)
     if found.measured > config.budget_delta_e:
         raise AccuracyError(
             f"the table misses its budget: on {found.random.directions} random directions its mean CIELAB error at "
             f"{found.exposure_ru:g} RU is {found.measured:.3g}, and accuracy.delta_e allows "
-            f"{config.budget_delta_e:g}. {_way_out(reference, config)}"
+            f"{config.budget_delta_e:g}. {_remedy(reference, config)}"
         )
     return found
 
 
-def _way_out(reference: MeanReference, config: Config) -> str:
-    """What to do about a missed budget: grids follow anything but the sharp edge of what a coarse scan knows."""
-    text = 'Raise it, or leave table.rings, azimuths, terms and w_terms on "auto".'
+def _remedy(reference: MeanReference, config: Config) -> str:
+    """Suggests what to do about a missed budget; a grid cannot resolve the hard cut at the scan's Nyquist limit."""
+    text = 'Raise accuracy.delta_e, or leave table.rings, azimuths, terms and w_terms on "auto".'
     band = min(reference.fields[0].band_limit_per_um)
     if band >= plan.rho_max(config.scene) / (1e-3 * config.light.lambda_min_nm):
         return text
     return (
-        f"{text} Where light is bright at {band:.3g} per um, where the pitch ends what is known, no table follows "
-        "the sudden dark: spectrum.range_nm or scene.views can leave out what lies beyond."
+        f"{text} If light is still bright at {band:.3g} per um, the scan's Nyquist limit, no table resolves the hard "
+        "cut there: rescan with a finer pitch, or narrow spectrum.range_nm or scene.views."
     )
 
 
 def certify_spectral(power: PolarPowerSpectrum, reference: MeanReference, config: Config) -> RelativeError:
-    """Errors of I_lambda of the spectral form on random directions."""
+    """Measures |P|^2 of single wavelengths, by the spectral form of a table, on random directions.
+
+    power: the power spectrum E. reference: of the same height field. config: its light and scene are read.
+    Returns relative errors, over max(|P|^2, 1e-7 of the mirror).
+    """
     wi, wr = random_pairs(config.scene, _SPECTRAL_DIRECTIONS, _SEED)
     uvw = geometry.uvw(wi, wr)
     wavelengths = trapezoid(config.light, _SPECTRAL_STEP_NM).lambda_nm

@@ -1,4 +1,4 @@
-"""How far a table is from the reference: on random directions, on maps, and as its settings vary."""
+"""Errors of a table against the exact reference, on random directions and on maps."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -22,15 +22,15 @@ from pipeline.tables.evaluate import Evaluator, Map
 MAP_SIZE, MAP_RADIUS = 301, 0.98
 RANDOM_DIRECTIONS = 2000
 _SEED = 20140601
-# |P|^2 below this share of the mirror is compared with it, not with itself
+# relative errors of a smaller |P|^2 are relative to this share of the mirror
 MIRROR_FLOOR = 1e-7
-# what the reference promises, of the mirror
+# the largest error of the reference, of the mirror
 _REFERENCE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class RelativeError:
-    """Statistics of |value - reference| / max(|reference|, floor)."""
+    """Statistics of |value - reference| / max(|reference|, floor) over all values."""
 
     median: float
     percentile_99: float
@@ -38,7 +38,10 @@ class RelativeError:
 
 
 def relative_error(values: Array, reference: Array, floor: float) -> RelativeError:
-    """Relative error where the reference exceeds `floor`, absolute over `floor` below it."""
+    """Computes statistics of |value - reference| / max(|reference|, floor).
+
+    values, reference: arrays of one shape. floor: in the unit of both.
+    """
     error = np.abs(values - reference) / np.maximum(np.abs(reference), floor)
     return RelativeError(float(np.median(error)), float(np.percentile(error, 99)), float(error.max()))
 
@@ -50,7 +53,11 @@ def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourErr
 
 @dataclass(frozen=True)
 class RandomCheck:
-    """A table against the reference on random directions: Y of |P|^2 integrated, and colours."""
+    """Errors of a table against the reference on random directions.
+
+    directions: their number. power: of Y over that of a mirror, which is |P|^2 integrated over wavelengths.
+    colour: CIELAB errors, one for each exposure.
+    """
 
     directions: int
     power: RelativeError
@@ -60,11 +67,16 @@ class RandomCheck:
 def check_random(
     evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> RandomCheck:
-    """The table (`evaluate`) against the reference on directions it was not made for."""
+    """Compares a table with the reference on 2000 random directions that its planning did not use.
+
+    evaluate: computes the table's XYZ for pairs of directions. reference: of the same height field.
+    config: its light, material, scene and exposure are read.
+    progress: called with a step's name and its completed share, 0 to 1.
+    """
     wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
     truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
-    # over a mirror's Y what is left is |P|^2
+    # Y over that of a mirror is |P|^2, without the material's factors
     mirror = config.radiometry.mirror_luminance(wi, wr)
     power = relative_error(found[:, 1] / mirror, truth[:, 1] / mirror, MIRROR_FLOOR)
     return RandomCheck(len(wi), power, _colour_errors(config, found, truth))
@@ -72,7 +84,10 @@ def check_random(
 
 @dataclass(frozen=True)
 class MapCheck:
-    """A table against the reference on one light's map; images are XYZ (size, size, 3) in RU."""
+    """Errors of a table against the reference on the map of one light.
+
+    views: the map. table, reference: XYZ (size, size, 3), RU. colour: CIELAB errors, one for each exposure.
+    """
 
     views: Map
     table: Array
@@ -80,7 +95,7 @@ class MapCheck:
     colour: list[ColourError]
 
     def delta_e_image(self, exposure_ru: float) -> Array:
-        """CIELAB error (size, size) at an exposure."""
+        """Computes the CIELAB error (size, size) at an exposure, RU."""
         return delta_e(self.table, self.reference, exposure_ru)
 
 
@@ -92,7 +107,13 @@ def check_map(
     radius: float,
     progress: Progress = silent,
 ) -> MapCheck:
-    """The table against the reference on the map of one light (3,)."""
+    """Compares a table with the reference on the map of one light.
+
+    evaluate: computes the table's XYZ for pairs of directions. reference: of the same height field.
+    config: its light, material and exposure are read. light: unit vector (3,) towards it.
+    radius: sin(theta) of the outermost views; at most 0.98 is used.
+    progress: called with a step's name and its completed share, 0 to 1.
+    """
     views = Map(MAP_SIZE, min(MAP_RADIUS, radius))
     wr = views.views()
     wi = np.broadcast_to(light, wr.shape)
@@ -103,12 +124,16 @@ def check_map(
 
 
 def check_reference(field: HeightField, reference: Reference, config: Config, directions: int = 3) -> RelativeError:
-    """The reference's fast route against the plain sum over samples, on a few directions, each at one wavelength.
+    """Compares the reference with the plain sum over samples, on a few directions, each at one wavelength.
 
-    Raises AccuracyError where they differ: then nothing measured against the reference means anything.
+    field: the height field. reference: made of it. config: its light, scene and window are read.
+    directions: number of random directions; a mirror direction is added.
+    Returns relative errors of |P|^2.
+    Raises AccuracyError where they differ by more than 1e-9 of the mirror, because then no error that is measured
+    against the reference can be trusted.
     """
     wi, wr = random_pairs(config.scene, directions, _SEED + 1)
-    # the mirror direction is within every scan's band
+    # the mirror direction lies within the Nyquist limits of every scan
     uvw = np.concatenate([geometry.uvw(wi, wr), [[0.0, 0.0, -1.5]]])
     nodes = trapezoid(config.light, 100.0).lambda_nm
     direction = np.arange(len(uvw))
@@ -118,14 +143,14 @@ def check_reference(field: HeightField, reference: Reference, config: Config, di
     fast = reference.power(uvw, nodes)[direction, node]
     if np.max(np.abs(fast - direct)[known]) > _REFERENCE_TOLERANCE:
         raise AccuracyError(
-            f"the exact reference's two routes differ by {np.max(np.abs(fast - direct)[known]):.1e} of the mirror, "
-            f"more than {_REFERENCE_TOLERANCE:g}; please report this config"
+            f"the two algorithms of the exact reference differ by {np.max(np.abs(fast - direct)[known]):.1e} of the "
+            f"mirror, more than {_REFERENCE_TOLERANCE:g}; please report this config"
         )
     return relative_error(fast[known], direct[known], MIRROR_FLOOR)
 
 
 def _direct_sums(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: Array) -> Array:
-    """|P|^2 (directions,) by plain sums, each direction at its own wavelength, a thread a sum."""
+    """Computes |P|^2 (directions,) by plain sums, each direction at its own wavelength and in its own thread."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = pool.map(lambda one, nm: power_direct(field, sigma_um, one[None], float(nm))[0], uvw, lambda_nm)
         return np.array(list(found))

@@ -1,4 +1,4 @@
-"""The exact reference of a config: what its tables are measured against."""
+"""The exact reference of a config, with which its tables are compared."""
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
@@ -10,13 +10,21 @@ from pipeline.tables.evaluate import Evaluator
 
 
 def reference_of(field: HeightField, config: Config, progress: Progress = silent) -> MeanReference:
-    """The reference of a config: the mean over windows where its table is one, else the middle window's."""
+    """Makes the reference of a config: the mean over all coherence windows if its table is one, else the middle one.
+
+    field: the height field. config: its window, light and layout are read.
+    progress: called with a step's name and its completed share, 0 to 1.
+    """
     fields = windows.places(field, config.coherence) if config.table.averages_windows else [field]
     return MeanReference(fields, config.coherence.sigma_um, config.light.lambda_min_nm, progress)
 
 
 def reference_evaluator(field: HeightField, config: Config, progress: Progress = silent) -> Evaluator:
-    """XYZ of pairs of directions by the exact reference under a config's light and material."""
+    """Makes a function that computes XYZ for pairs of directions by the exact reference.
+
+    field: the height field. config: its window, light, material and layout are read.
+    Returns the function: unit vectors wi, wr (directions, 3) -> XYZ (directions, 3) at 1 RU.
+    """
     reference = reference_of(field, config, progress)
 
     def evaluate(wi: Array, wr: Array) -> Array:

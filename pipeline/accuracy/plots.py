@@ -1,4 +1,4 @@
-"""Plots, each returned as PNG bytes."""
+"""Plots of the validation report, each returned as PNG bytes."""
 
 import io
 from collections.abc import Sequence
@@ -18,15 +18,16 @@ _MOST_PIXELS = 512
 
 
 def png(figure: Figure) -> bytes:
+    """Draws a figure as PNG."""
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
-    # no creation time or version inside: the same data gives the same picture
+    # without creation time and version, equal data give equal files
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     return buffer.getvalue()
 
 
 def height_map(field: HeightField) -> bytes:
-    """The height field in micrometres, y up."""
+    """Plots a height field, nm over um, with y up."""
     figure = Figure(figsize=(5.6, 4.6), layout="constrained")
     axes = figure.subplots()
     skip = max(1, max(field.shape) // _MOST_PIXELS)
@@ -51,7 +52,10 @@ def _axes_of_map(axes: Any, title: str) -> None:
 
 
 def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
-    """One light's map: reference, table, and the CIELAB error between them. `light` names it."""
+    """Plots the map of one light: reference, table, and the CIELAB error between them.
+
+    show_ru: exposure of the two maps, RU. error_ru: exposure of the error, RU. light: its name for the titles.
+    """
     figure = Figure(figsize=(11.0, 3.7), layout="constrained")
     panels = figure.subplots(1, 3)
     extent = (-1, 1, -1, 1)
@@ -68,11 +72,11 @@ def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str)
 
 
 def convergence(curves: Sequence[Curve], exposure_ru: float) -> bytes:
-    """Mean CIELAB error against each setting, the chosen value marked."""
+    """Plots the mean CIELAB error against each setting, at an exposure, RU; the chosen value is marked."""
     figure = Figure(figsize=(11.0, 3.2), layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, len(curves)))
     for axes, curve in zip(panels, curves, strict=True):
-        # an error below any display's reach is drawn at 1e-6 rather than off a logarithmic axis
+        # smaller errors cannot be seen on any display; 1e-6 keeps zeros on the logarithmic axis
         axes.plot(curve.values, np.maximum(curve.errors, 1e-6), "o-", color="#2a6f97")
         axes.axvline(curve.chosen, color="#bb3e03", linestyle="--", linewidth=1, label=f"chosen: {curve.chosen:g}")
         axes.set_yscale("log")

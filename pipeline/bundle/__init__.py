@@ -1,1 +1,1 @@
-"""Bundles: tables published as a folder that stands alone, can be checked and says how it was made."""
+"""Bundles: folders with published tables that need no other file, can be verified, and state their origin."""

@@ -1,6 +1,6 @@
-"""SHA256SUMS: what `sha256sum -c` reads, and what a bundle's digest is taken over.
+"""SHA256SUMS, which `sha256sum -c` reads, and the digest of a bundle.
 
-The digest is the SHA-256 of SHA256SUMS itself, so `sha256sum SHA256SUMS` shows how the folder's name ends.
+The digest is the SHA-256 of SHA256SUMS itself, so `sha256sum SHA256SUMS` prints the end of the folder's name first.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
 def write(folder: Path) -> str:
-    """Writes SHA256SUMS over all files of a folder, sorted by name; returns its digest, 12 digits."""
+    """Writes SHA256SUMS of all files of a folder, sorted by name, and returns its digest, 12 hex digits."""
     files = digest.of_folder(folder)
     lines = [f"{files[name]['sha256']}  {name}\n" for name in sorted(files)]
     (folder / SUMS).write_text("".join(lines), encoding="utf-8", newline="\n")
@@ -23,12 +23,15 @@ def write(folder: Path) -> str:
 
 
 def of_sums(folder: Path) -> str:
-    """The first 12 digits of the SHA-256 of SHA256SUMS."""
+    """Computes the digest of a bundle, the first 12 hex digits of the SHA-256 of SHA256SUMS."""
     return hashlib.sha256((folder / SUMS).read_bytes()).hexdigest()[:_SHOWN]
 
 
 def parse(text: str) -> tuple[dict[str, str], list[str]]:
-    """SHA-256 by file name, and one line for every entry that cannot be one of a bundle."""
+    """Parses SHA256SUMS.
+
+    Returns the SHA-256 of each file by name, and a message for every line that is malformed or names a file outside.
+    """
     sums: dict[str, str] = {}
     faults = []
     for number, line in enumerate(text.splitlines(), start=1):

@@ -1,4 +1,4 @@
-"""What fills a manifest whatever the table's layout: from a config and its artifacts."""
+"""The entries of a manifest that do not depend on the table's layout, from a config and its artifacts."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -31,11 +31,11 @@ CONVENTIONS = {
 
 
 def units(config: Config, table: str) -> dict[str, str]:
-    """The unit of every kind of number in the bundle; `table` names what the tables hold."""
+    """Returns the unit of each kind of number in the bundle; table: name of the quantity in the tables."""
     absolute = config.material.normalisation == "absolute"
     return {
         table: "1/sr" if absolute else "1",
-        "XYZ": "1/sr, for it is a BRDF times cos(theta_i)" if absolute else "RU",
+        "XYZ": "1/sr, because it is a BRDF times cos(theta_i)" if absolute else "RU",
         "u, v, w": "1",
         "lengths": "um",
         "wavelengths": "nm",
@@ -44,7 +44,7 @@ def units(config: Config, table: str) -> dict[str, str]:
 
 
 def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
-    """Light and observer."""
+    """Returns the entry on light and observer; inputs: the artifacts of all stages before, by stage."""
     return Colour(
         observer=config.light.observer,
         illuminant=_illuminant(config),
@@ -55,7 +55,7 @@ def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
 
 
 def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
-    """What the scan's band and the scene leave out."""
+    """Returns the entry on directions that the scan's Nyquist limits and the scene exclude."""
     table, band = inputs["table"].summary, inputs["surface"].summary["statistics"]["band_limit_per_um"]
     known = 1e-3 * config.light.lambda_min_nm * min(band)
     return Coverage(
@@ -67,7 +67,7 @@ def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
 
 
 def domain(config: Config, inputs: Mapping[str, Artifact]) -> Domain:
-    """Where the surface lies in the scalar model's domain, at the light's line or the eye's middle wavelength."""
+    """Returns the errors of the scalar model for the surface, at the laser line or at 550 nm."""
     illuminant = config.light.illuminant
     lambda_nm = illuminant.lambda_nm if isinstance(illuminant, LaserLine) else _LUMINOUS_NM
     statistics = inputs["surface"].summary["statistics"]
@@ -85,7 +85,7 @@ def domain(config: Config, inputs: Mapping[str, Artifact]) -> Domain:
 
 
 def made_by(inputs: Mapping[str, Artifact]) -> MadeBy:
-    """The tool, libraries and device that made the table, as recorded with it: never this machine's own."""
+    """Returns the tool, libraries and device in the record of the table, which another machine may have made."""
     recorded = inputs["table"].record.get("provenance", {})
     return MadeBy(
         diffract_bake=str(recorded.get("diffract-bake", _NOT_RECORDED)),
@@ -97,12 +97,12 @@ def made_by(inputs: Mapping[str, Artifact]) -> MadeBy:
 
 
 def provenance(config: Config, keys: Mapping[str, str]) -> Provenance:
-    """Where the bundle comes from; `keys` are the artifacts' addresses by stage."""
+    """Returns the origin of the bundle; keys: the artifacts' addresses by stage."""
     return Provenance(config=resolved(config), artifacts=dict(keys))
 
 
 def resolved(config: Config) -> dict[str, Any]:
-    """The whole config, files by name and content, without folders of this machine."""
+    """Returns the whole config as JSON, each file by name and SHA-256, without folders of this machine."""
     resolved = config.model_dump(mode="json")
     resolved["surface"]["path"] = None if config.surface.path is None else _named_file(config.surface.path)
     resolved["spectrum"]["illuminant"] = _illuminant(config)

@@ -1,4 +1,4 @@
-"""Evaluates a diffraction BRDF bundle: what a shader must reproduce. Needs numpy and OpenEXR alone.
+"""Evaluates a diffraction BRDF bundle, as a shader has to. Needs only numpy and OpenEXR.
 
     python evaluate.py directions.csv
 
@@ -20,7 +20,7 @@ COLUMNS, AT_ONCE = "theta_i,phi_i,theta_r,phi_r", 16384  # directions at once, t
 
 
 class BundleTables:
-    """A bundle in memory: XYZ = C cos(ti) times what its table holds at (u, v, w) = -wi - wr."""
+    """A bundle in memory: XYZ = C cos(ti) times the value of its table at (u, v, w) = -wi - wr."""
 
     def __init__(self, folder: Path) -> None:
         self.manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -30,15 +30,15 @@ class BundleTables:
         self.table = layout(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """XYZ (directions, 3) for unit vectors wi, wr (directions, 3); nan where not computed."""
+        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3); nan where not computed."""
         if np.any(wi[:, 2] <= 0.0) or np.any(wr[:, 2] <= 0.0):
-            raise ValueError("a direction lies on or below the horizon: the table knows only z > 0")
+            raise ValueError("expected directions above the horizon, z > 0, got one on or below it")
         parts = [slice(first, first + AT_ONCE) for first in range(0, len(wi), AT_ONCE)]
         found = [self.c_cos(wi[s], wr[s])[:, None] * self.table.value(*(-wi[s] - wr[s]).T) for s in parts]
         return np.concatenate([np.empty((0, 3)), *found])
 
     def c_cos(self, wi: Array, wr: Array) -> Array:
-        """C cos(ti) = (R / divisor)^exponent (1 + wi.wr)^2 / (cos(tr) w^2), times V-cavity shadowing."""
+        """Computes C cos(ti) = (R / divisor)^exponent (1 + wi.wr)^2 / (cos(tr) w^2), times V-cavity shadowing."""
         material = self.manifest["material"]
         dot, w = np.sum(wi * wr, axis=-1), -wi[:, 2] - wr[:, 2]
         cos_half = np.sqrt(np.clip(0.5 * (1.0 + dot), 0.0, 1.0))
@@ -50,7 +50,7 @@ class BundleTables:
         return np.asarray(factor)
 
     def reflectance(self, cos: Array) -> Array:
-        """R(cos_half): Schlick's term, Fresnel's |r|^2 averaged over the samples of n + ik, or 1 without either."""
+        """Computes R(cos_half): Schlick's term, Fresnel's |r|^2 averaged over the samples of n + ik, or 1."""
         f0, samples = self.manifest["material"]["schlick_f0"], self.manifest["material"]["samples"]
         if f0 is not None:
             return np.asarray(f0 + (1.0 - f0) * (1.0 - cos) ** 5)
@@ -72,24 +72,24 @@ class PolarTextures:
         self.basis = basis.reshape(outputs, 3, grid["w_terms"])
 
     def value(self, u: Array, v: Array, w: Array) -> Array:
-        """g(rho) sum_k T_k(2 |w| / w_max - 1) sum_o output_o(u, v) basis[o, channel, k]: (directions, 3)."""
+        """Computes g(rho) sum_k T_k(2 |w| / w_max - 1) sum_o output_o(u, v) basis[o, channel, k], (directions, 3)."""
         rho = np.hypot(u, v)
         x = np.clip(2.0 * np.abs(w) / np.sqrt(np.maximum(4.0 - rho**2, 1e-9)) - 1.0, -1.0, 1.0)
         chebyshev = np.cos(np.arange(self.basis.shape[2]) * np.arccos(x)[:, None])
         g = (1.0 + (rho / self.grid["envelope_radius"]) ** 2) ** -self.grid["envelope_exponent"]
         ring, last = np.arcsinh(rho / self.grid["r0"]) / self.grid["step"], self.grid["height"] - 1
-        g[ring > last + 1e-6] = np.nan  # the scene does not reach there
+        g[ring > last + 1e-6] = np.nan  # outside the scene
         outputs = self.interpolate(np.minimum(ring, last), self.azimuth(u, v))
         return np.asarray(g[:, None] * np.einsum("no,ock,nk->nc", outputs, self.basis, chebyshev, optimize=True))
 
     def azimuth(self, u: Array, v: Array) -> Array:
-        """Fractional column of (u, v), turned by -axis and stretched."""
+        """Computes the fractional column of (u, v), turned by -axis and stretched."""
         cos, sin = np.cos(self.grid["axis_rad"]), np.sin(self.grid["axis_rad"])
         angle = np.arctan2(cos * v - sin * u, self.grid["stretch"] * (cos * u + sin * v))
         return np.asarray(angle / (2.0 * np.pi) % 1.0 * self.grid["width"])
 
     def interpolate(self, ring: Array, azimuth: Array) -> Array:
-        """Outputs (directions, outputs) between texels, from the 4 x 4 around each place."""
+        """Interpolates outputs (directions, outputs) from the 4 x 4 texels around each place."""
         total = np.zeros((len(ring), len(self.basis)))
         rows, columns = np.floor(ring).astype(int) - 1, np.floor(azimuth).astype(int) - 1
         for a, across in enumerate(spline(ring % 1.0)):
@@ -98,14 +98,14 @@ class PolarTextures:
         return total
 
     def place(self, row: NDArray[Any], column: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Texels of any row and column: through the origin, mirrored at the last ring, periodic around the turn."""
+        """Maps rows and columns beyond the grid to texels: through the origin, mirrored at the rim, periodic."""
         height, width = self.grid["height"], self.grid["width"]
         column = (column + np.where(row < 0, width // 2, 0)) % width
         return height - 1 - np.abs(height - 1 - np.abs(row)), column
 
 
 def spline(t: Array) -> Array:
-    """The weights (4, places) of a cubic B-spline's four texels."""
+    """Computes the weights (4, places) of a cubic B-spline's four texels."""
     s = 1.0 - t
     return np.stack([s**3, 4.0 - 3.0 * t**2 * (2.0 - t), 4.0 - 3.0 * s**2 * (2.0 - s), t**3]) / 6.0
 
@@ -119,7 +119,7 @@ class TaylorTextures:
         self.n, self.power = int(grid["width"]), float(grid["power"])
 
     def value(self, u: Array, v: Array, w: Array) -> Array:
-        """sum_p w^p I_p(u, v): (directions, 3)."""
+        """Computes sum_p w^p I_p(u, v), (directions, 3)."""
         column, row = self.texel(u), self.texel(v)
         left, low = (np.clip(np.floor(index).astype(int), 0, self.n - 2) for index in (column, row))
         a, b = column - left, row - low
@@ -132,12 +132,12 @@ class TaylorTextures:
         return total
 
     def texel(self, u: Array) -> Array:
-        """Fractional texel index of u: u = 2 |t|^a sign(t), t = 2 i / (n - 1) - 1. Texture: (i + 1/2) / n."""
+        """Computes the texel index i of u = 2 |t|^a sign(t), t = 2 i / (n - 1) - 1; texture: (i + 1/2) / n."""
         t = np.sign(u) * (np.abs(u) / 2.0) ** (1.0 / self.power)
         return np.asarray(0.5 * (t + 1.0) * (self.n - 1))
 
     def polynomial(self, i_p: NDArray[Any], w: Array) -> Array:
-        """sum_p w^p I_p by Horner's rule, from the highest p down."""
+        """Computes sum_p w^p I_p by Horner's rule, from the highest p down."""
         total = np.zeros((len(w), 3))
         for p in range(len(self.scale) - 1, -1, -1):
             total = total * w[:, None] + self.scale[p] * i_p[..., p].astype(float)
@@ -145,19 +145,19 @@ class TaylorTextures:
 
 
 def read_rgba(path: Path) -> NDArray[Any]:
-    """The pixels (row, column, RGBA) of an EXR; row 0 is its first line."""
+    """Reads the pixels (row, column, RGBA) of an EXR; row 0 is its first line."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return np.stack([file.channels()[name].pixels for name in "RGBA"], axis=-1)
 
 
 def direction(theta_deg: Array, phi_deg: Array) -> Array:
-    """Unit vectors (directions, 3) from the polar angle from z and the azimuth from +x, degrees."""
+    """Computes unit vectors (directions, 3) from the angle to z and the azimuth from +x towards +y, degrees."""
     theta, phi = np.radians(theta_deg), np.radians(phi_deg)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
 
 
 def read_directions(text: str) -> Array:
-    """Rows (directions, 4) of a CSV in degrees; '#' starts a comment, the names of the columns may lead."""
+    """Reads rows (directions, 4) of a CSV in degrees; '#' starts a comment, a first line may name the columns."""
     rows: list[list[float]] = []
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.partition("#")[0].strip()

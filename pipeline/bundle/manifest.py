@@ -1,6 +1,6 @@
-"""manifest.json: its schema. A table's grid, images and losses are told in the terms of its layout.
+"""The schema of manifest.json. Grid, images and storage loss of a table have entries for each layout.
 
-It holds nothing that differs between two publications of one content: no time, host, folder or run time.
+A manifest holds nothing that differs between two publications of the same content: no time, host, folder or run time.
 """
 
 import json
@@ -32,7 +32,7 @@ class Image(Validated):
 
 
 class TaylorImage(Image):
-    """I_p of one p = `index`: R, G, B hold X, Y, Z of I_p / scale, A is 1 where computed, else 0."""
+    """The image of I_p for p = `index`: R, G, B hold X, Y, Z of I_p / scale; A is 1 where computed, else 0."""
 
     layout: Literal["taylor"]
     index: Annotated[int, Field(ge=0)]
@@ -41,7 +41,7 @@ class TaylorImage(Image):
 
 
 class PolarImage(Image):
-    """Outputs 4 index ... 4 index + 3 in R, G, B, A, each over its scale."""
+    """The image of outputs 4 index ... 4 index + 3 in R, G, B, A, each divided by its scale."""
 
     layout: Literal["polar"]
     index: Annotated[int, Field(ge=0)]
@@ -53,7 +53,7 @@ TableImage = Annotated[TaylorImage | PolarImage, Field(discriminator="layout")]
 
 
 class MapImage(Image):
-    """The BRDF map of one light: XYZ under 1 RU, and as a picture at an exposure."""
+    """The BRDF map of one light: XYZ at 1 RU, and a picture at an exposure."""
 
     theta_deg: float
     phi_deg: float
@@ -65,7 +65,7 @@ class MapImage(Image):
 
 
 class TaylorGridEntry(Validated):
-    """Where the texels of a Taylor table stand in (u, v)."""
+    """Positions of the texels of a Taylor table in (u, v)."""
 
     layout: Literal["taylor"]
     width: int
@@ -75,7 +75,7 @@ class TaylorGridEntry(Validated):
     columns: str = "u grows with the column, from -u_max at column 0"
     rows: str = "v grows with the row, from -u_max at row 0 (the first line of the image)"
     node: str = "u = u_max |t|^a sign(t), a = power; v likewise"
-    texel: str = "texel i of n stands at t = 2 i / (n - 1) - 1"
+    texel: str = "texel i of n lies at t = 2 i / (n - 1) - 1"
     texture: str = "texel i of n has its centre at texture coordinate (i + 1/2) / n"
     interpolation: str = (
         "bilinear between texels, in the index i = (t + 1) (n - 1) / 2, t = sign(u) (|u| / u_max)^(1/a)"
@@ -83,9 +83,9 @@ class TaylorGridEntry(Validated):
 
 
 class PolarGridEntry(Validated):
-    """Where the texels of a polar table stand in (u, v), and what is made of them.
+    """Positions of the texels of a polar table in (u, v), and the formula of the look-up.
 
-    basis: (outputs, 3, w_terms); None where every output is a term of its own.
+    basis: (outputs, 3, w_terms); None where every output is one term.
     """
 
     layout: Literal["polar"]
@@ -115,8 +115,8 @@ class PolarGridEntry(Validated):
         "(4 - 3 (1 - t)^2 (1 + t)) / 6, t^3 / 6"
     )
     border: str = (
-        "columns are periodic; row -i is row i half a turn on, (-i, j) = (i, j + width / 2), for the first ring is "
-        "one point; beyond the last row they are mirrored, (height - 1 + i, j) = (height - 1 - i, j)"
+        "columns are periodic; row -i is row i after half a turn, (-i, j) = (i, j + width / 2), since the first ring "
+        "is one point; beyond the last row they are mirrored, (height - 1 + i, j) = (height - 1 - i, j)"
     )
     outputs: str = "output o, interpolated, is channel o mod 4 (R, G, B, A) of table image o div 4, times its scale"
     terms: str = (
@@ -135,11 +135,11 @@ Grid = Annotated[TaylorGridEntry | PolarGridEntry, Field(discriminator="layout")
 
 
 class TaylorLoss(Validated):
-    """What storing the table in half floats adds, against the float table.
+    """The error that half floats add to a Taylor table, against the table in float32.
 
-    relative_error_of_y: over so many "random" directions and the "mirror" directions of their lights (where a
-    scene has them), with Y as a share of a mirror's and a floor. largest_delta_e: over both. subnormal_share:
-    of all computed values, those that half keeps with fewer than 11 bits.
+    directions: number of random directions. relative_error_of_y: on the "random" directions and on the "mirror"
+    directions of their lights (where a scene has them), of Y over that of a mirror, relative to at least `floor`.
+    largest_delta_e: CIELAB error on both. subnormal_share: of the computed values, those with fewer than 11 bits.
     """
 
     layout: Literal["taylor"]
@@ -152,11 +152,12 @@ class TaylorLoss(Validated):
 
 
 class PolarLoss(Validated):
-    """What few textures and half floats leave, on random directions.
+    """The error of a polar table in few textures or half floats, on random directions.
 
-    textures: RGBA textures, of as many as `most_textures` that would hold everything. error: of what is stored,
-    against the exact sum. added: against the table before. added_in_mirror: the same in the mirror directions of the
-    lights, at 1 RU. subnormal_share: of all values, those that half keeps with fewer than 11 bits; None for float.
+    textures: number of RGBA textures; `most_textures` would hold the whole table. error: of the stored textures
+    against the exact sum. added: against the table as baked. added_in_mirror: the same in the mirror directions of
+    the lights, at 1 RU. subnormal_share: of all values, those that half floats store with fewer than 11 bits; None
+    for float.
     """
 
     layout: Literal["polar"]
@@ -175,7 +176,10 @@ StorageLoss = Annotated[TaylorLoss | PolarLoss, Field(discriminator="layout")]
 
 
 class Colour(Validated):
-    """The space of all numbers. step_nm: of the `wavelengths`; None where each ring has its own, at most so many."""
+    """The colour space of all numbers.
+
+    wavelengths: number in the spectral integral, the largest of all rings. step_nm: None where each ring has its own.
+    """
 
     space: str = "CIE XYZ, linear (not sRGB)"
     observer: str
@@ -187,11 +191,12 @@ class Colour(Validated):
 
 
 class Coverage(Validated):
-    """What the table does not know.
+    """Directions without data.
 
-    unknown_share: of the (u, v) disc's light, beyond the scan's band: taken as dark. skipped_share: of the
-    disc, not computed because no light and view of the scene reach it.
-    known_radius: sqrt(u^2 + v^2) up to which every wavelength lies within the scan's band, at most 2.
+    unknown_share: share of the light in the (u, v) disc beyond the scan's Nyquist limits, which counts as dark.
+    skipped_share: share of the disc that is not computed, because no light and view of the scene reach it.
+    known_radius: sqrt(u^2 + v^2) up to which every wavelength lies within the Nyquist limits, at most 2.
+    band_limit_per_um: the Nyquist limits along x and y, 1/um.
     """
 
     unknown_share: float
@@ -201,11 +206,11 @@ class Coverage(Validated):
 
 
 class Domain(Validated):
-    """How far the scalar model itself can be trusted here: its largest errors against rigorous coupled waves.
+    """The largest errors of the scalar model for this surface, against rigorous coupled waves.
 
-    Of an order's efficiency, a share of what the flat surface reflects: of a sinusoid and of a blaze with the
-    surface's finest significant period and rms height, at a wavelength. None of periods too fine or reliefs too deep
-    for what was compared; all None of a surface without a period.
+    They are errors of an order's efficiency, as shares of what the flat surface reflects, of a sinusoid
+    (error_of_smooth) and of a blaze (error_of_edged) with the surface's finest significant period and rms height, at
+    lambda_nm. None for periods too fine or depths too large for the comparison; all None without a period.
     """
 
     model: str = "scalar: one reflection, no polarisation, no shadows but the V-cavity's"
@@ -222,6 +227,8 @@ class Domain(Validated):
 
 
 class MadeBy(Validated):
+    """The versions and the device that made the table, and the versions of all stages."""
+
     diffract_bake: str
     stages: dict[str, int]
     libraries: dict[str, str]
@@ -230,14 +237,14 @@ class MadeBy(Validated):
 
 
 class Provenance(Validated):
-    """The whole config, files by name and content, and the artifacts' addresses in the store."""
+    """The whole config, files by name and SHA-256, and the artifacts' addresses in the store."""
 
     config: dict[str, Any]
     artifacts: dict[str, str]
 
 
 class Manifest(Validated):
-    """manifest.json, whole."""
+    """The content of manifest.json."""
 
     schema_version: Literal[3]
     name: str
@@ -264,5 +271,5 @@ class Manifest(Validated):
     provenance: Provenance
 
     def text(self) -> str:
-        """As it stands in the bundle."""
+        """Returns the text of the file."""
         return json.dumps(self.model_dump(mode="json"), indent=1, ensure_ascii=True, allow_nan=False) + "\n"

@@ -1,4 +1,4 @@
-"""The material's C, spelled out with its numbers, so that a shader needs no table of constants."""
+"""The manifest's entry on the material: the factor C with all its numbers, so that a shader needs no other table."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from pipeline.validated import Validated
 
 REFLECTANCE = "reflectance.csv"
 _NODES = 257
-# where between two nodes linear interpolation is held against the formula
+# linear interpolation is compared with the formula at this many places per interval
 _BETWEEN = 16
 
 FORMULA = (
@@ -34,7 +34,7 @@ INSIDE = "R = 1: the metal's reflectance, at every angle and wavelength, is insi
 
 
 class Samples(Validated):
-    """Index n + ik of the medium at wavelengths, and the weight of each in R; one without dispersion."""
+    """Index n + ik of the medium at wavelengths, nm, and the weight of each in R; one sample without dispersion."""
 
     lambda_nm: list[float] | None
     n: list[float]
@@ -43,7 +43,7 @@ class Samples(Validated):
 
 
 class ReflectanceTable(Validated):
-    """R on equidistant nodes of cos_half in [0, 1], for shaders; largest_error: of R, by interpolation."""
+    """R on equidistant nodes of cos_half in [0, 1], for shaders; largest_error: of R interpolated between them."""
 
     file: Literal["reflectance.csv"]
     nodes: int
@@ -52,7 +52,7 @@ class ReflectanceTable(Validated):
 
 
 class MaterialEntry(Validated):
-    """C = (R / divisor)^exponent G D / w^2 with all numbers; `ior` and `metal` say where they are from."""
+    """The factor C = (R / divisor)^exponent G D / w^2 with all numbers; `ior` and `metal` are their source."""
 
     fresnel: Literal["none", "schlick", "dielectric", "conductor"]
     normalisation: Literal["relative", "absolute"]
@@ -71,18 +71,22 @@ class MaterialEntry(Validated):
 
 @dataclass(frozen=True)
 class Medium:
-    """What light is reflected by: complex indices (L,) and their weights (L,) in the mean reflectance."""
+    """A reflecting medium.
+
+    lambda_nm: wavelengths (L,), nm; None without dispersion. index: n + ik (L,).
+    weight: of each wavelength in the mean reflectance (L,).
+    """
 
     lambda_nm: Array | None
     index: np.ndarray
     weight: Array
 
     def reflectance(self, cos_half: Array) -> Array:
-        """Weighted mean of Fresnel's reflectance (...,) at cosines (...,)."""
+        """Computes the weighted mean of the Fresnel reflectance (...,) at cosines of the half angle (...,)."""
         return np.asarray(fresnel.reflectance(cos_half[..., None], self.index) @ self.weight)
 
     def samples(self) -> Samples:
-        """As the manifest has it."""
+        """Returns the manifest's entry of the medium."""
         return Samples(
             lambda_nm=None if self.lambda_nm is None else self.lambda_nm.tolist(),
             n=self.index.real.tolist(),
@@ -92,7 +96,10 @@ class Medium:
 
 
 def medium(config: Config) -> Medium | None:
-    """What reflects outside the table: a dielectric, or a metal averaged as the eye's Y weighs it."""
+    """Returns the medium whose reflectance is part of C: a dielectric, or a metal averaged over its luminance Y.
+
+    Returns None for other materials, and where the table holds the metal's reflectance.
+    """
     if config.material.fresnel == "dielectric":
         return Medium(None, np.array([config.material.ior], dtype=complex), np.ones(1))
     if config.material.fresnel == "conductor" and not _inside_table(config):
@@ -103,12 +110,12 @@ def medium(config: Config) -> Medium | None:
 
 
 def _inside_table(config: Config) -> bool:
-    """Polar tables hold a metal's reflectance: rho and |w| fix the half angle."""
+    """Tells whether the table holds a metal's reflectance: rho and |w| determine the half angle."""
     return config.material.fresnel == "conductor" and config.table.holds_metals
 
 
 def entry(config: Config) -> MaterialEntry:
-    """The manifest's material: pipeline.optics.brdf.direction_factor in numbers."""
+    """Returns the manifest's entry of the material, `pipeline.optics.brdf.direction_factor` as numbers."""
     material, found = config.material, medium(config)
     conductor, relative = material.fresnel == "conductor", material.normalisation == "relative"
     return MaterialEntry(
@@ -116,23 +123,23 @@ def entry(config: Config) -> MaterialEntry:
         normalisation=material.normalisation,
         shadowing=material.shadowing,
         ior=material.ior if material.fresnel in ("schlick", "dielectric") else None,
-        # a file's folder is this machine's business
+        # a manifest holds no folder of this machine
         metal=Path(material.metal).name if conductor else None,
         formula=FORMULA,
         reflectance=INSIDE if _inside_table(config) else REFLECTANCES[material.fresnel],
         shadowing_formula=SHADOWING if material.shadowing else NO_SHADOWING,
         schlick_f0=float(fresnel.schlick(1.0, material.ior)) if material.fresnel == "schlick" else None,
         samples=None if found is None else found.samples(),
-        # an absolute conductor's normal reflectance is inside I_p, so only the ratio is left
+        # the reflectance of an absolute conductor at normal incidence is inside I_p, so only the ratio remains
         divisor=_at_normal(config, found) if relative or conductor else 1.0,
-        # the paper's F is squared as it is printed
+        # F is squared, as the paper prints it
         exponent=2 if relative and material.fresnel == "schlick" else 1,
         reflectance_table=_describe(found) if found is not None and conductor else None,
     )
 
 
 def _at_normal(config: Config, found: Medium | None) -> float:
-    """R(1)."""
+    """Computes R(1), the reflectance at normal incidence."""
     if found is not None:
         return float(found.reflectance(np.array(1.0)))
     return float(fresnel.schlick(1.0, config.material.ior)) if config.material.fresnel == "schlick" else 1.0
@@ -148,12 +155,12 @@ def _describe(found: Medium) -> ReflectanceTable:
 
 
 def reflectance_table(found: Medium) -> tuple[Array, Array]:
-    """cos_half and R on 257 equidistant nodes."""
+    """Computes R on equidistant nodes of cos_half; returns cos_half (257,) and R (257,)."""
     cos = np.linspace(0.0, 1.0, _NODES)
     return cos, found.reflectance(cos)
 
 
 def reflectance_csv(found: Medium) -> str:
-    """cos_half,R with 9 significant digits."""
+    """Writes the reflectance table as CSV, columns cos_half and R, with 9 significant digits."""
     rows: Any = zip(*reflectance_table(found), strict=True)
     return "cos_half,R\n" + "".join(f"{cos:.9g},{value:.9g}\n" for cos, value in rows)

@@ -1,4 +1,4 @@
-"""Polar tables in a bundle: images of spline coefficients, four outputs in each."""
+"""Polar tables in a bundle: images of spline coefficients with four outputs each."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -27,7 +27,7 @@ _EVALUATION = (
 )
 _WINDOW = (
     "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch; where plan.windows > 1, |P|^2 is its mean over "
-    "so many windows beside each other"
+    "that number of windows at different positions of the scan"
 )
 
 
@@ -38,10 +38,13 @@ def prepare(
     plan: dict[str, Any],
     certificate: dict[str, Any],
 ) -> Prepared:
-    """Makes a polar table ready for a bundle.
+    """Prepares a polar table for a bundle.
 
-    reference: makes the exact reference of the surface, which is asked for where storage loses digits.
-    plan, certificate: of the table, for the manifest. Raises AccuracyError where the stored table misses a budget.
+    config: its [publish], [accuracy], light, material and scene are read. table: the table.
+    reference: makes the exact reference of the surface; called only where storage loses digits.
+    plan, certificate: of the table, for the manifest.
+    Returns the layout's part of the bundle.
+    Raises AccuracyError where the stored table misses a budget.
     """
     stored, loss = polar_storage.choose(config, table, reference)
     entry = grid_entry(stored.textures)
@@ -72,7 +75,7 @@ def prepare(
 
 
 def grid_entry(textures: Textures) -> PolarGridEntry:
-    """Where the texels of textures stand and what is made of them."""
+    """Returns the manifest's entry on the positions and the meaning of the texels."""
     rings, azimuths = textures.grid.rings, textures.grid.azimuths
     outputs, _, terms = textures.basis.shape
     return PolarGridEntry(
@@ -92,7 +95,7 @@ def grid_entry(textures: Textures) -> PolarGridEntry:
 
 
 def _images(config: Config, stored: Stored) -> Iterator[Texture]:
-    """tables/T_00.exr ... and their pixels."""
+    """Yields the entry and the pixels (rings, azimuths, RGBA) of tables/T_00.exr, tables/T_01.exr, ..."""
     in_half = config.publish.precision == "half"
     for q in range(stored.textures.count):
         outputs = slice(CHANNELS * q, CHANNELS * (q + 1))

@@ -1,4 +1,4 @@
-"""How a polar table is stored: in how many textures, at what precision, and what that costs on random directions."""
+"""Storage of a polar table: number of textures, precision, and the error that they add on random directions."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -27,9 +27,10 @@ _MIRROR_EXPOSURE_RU = 1.0
 
 @dataclass(frozen=True)
 class Stored:
-    """Textures as they stand in files.
+    """Textures as they are stored in files.
 
-    values: float32 or float16 (rings, outputs, azimuths), over `scale` (outputs,). textures: what is read back.
+    values: float32 or float16 (rings, outputs, azimuths), divided by `scale`. scale: (outputs,).
+    textures: as they are read back.
     """
 
     values: NDArray[np.floating[Any]]
@@ -38,12 +39,12 @@ class Stored:
 
     @property
     def subnormal(self) -> NDArray[np.bool_]:
-        """Which values half keeps with fewer than 11 bits."""
+        """Marks the values that half floats store with fewer than 11 bits."""
         return half.subnormal(self.values)
 
 
 def store(textures: Textures, precision: str) -> Stored:
-    """Textures at a precision: float as they are; half over an envelope and a scale for each output."""
+    """Stores textures at a precision: "float" as they are, "half" divided by an envelope and a scale per output."""
     if precision == "float":
         return Stored(textures.values, np.ones(textures.values.shape[1]), textures)
     flat = flattened(textures)
@@ -56,10 +57,14 @@ def store(textures: Textures, precision: str) -> Stored:
 def choose(
     config: Config, table: PolarTable, reference: Callable[[], MeanReference]
 ) -> tuple[Stored, PolarLoss | None]:
-    """What [publish] asks for, and what it costs: None where nothing is lost.
+    """Stores a table as [publish] asks, and measures the error that this adds.
 
-    "auto" in half floats takes the fewest textures whose error is within the budget, all where none is. Raises
-    AccuracyError where the error exceeds a budget that the config sets.
+    "auto" in half floats takes the fewest textures whose error is within the budget, or all if no number keeps it.
+
+    config: its [publish], [accuracy], light, material and scene are read. table: the table.
+    reference: makes the exact reference; called only where storage loses digits.
+    Returns the stored textures and their error, None where nothing is lost.
+    Raises AccuracyError where the error exceeds a budget that the config sets.
     """
     asked, precision = config.publish.textures, config.publish.precision
     if precision == "float" and asked in ("auto", "full"):
@@ -75,7 +80,7 @@ def choose(
 
 
 def _candidates(asked: str | int, most: int) -> Iterable[int]:
-    """Numbers of textures to try, in order."""
+    """Lists the numbers of textures to try, in order."""
     if asked == "auto":
         return range(1, most + 1)
     return [most] if isinstance(asked, str) else [min(asked, most)]
@@ -86,7 +91,7 @@ def _textures(table: PolarTable, count: int, config: Config) -> Textures:
 
 
 class _Measure:
-    """Holds what is stored against the exact sum and against the table before, on random directions."""
+    """Compares stored textures with the exact sum and with the table itself, on random directions."""
 
     def __init__(self, config: Config, table: PolarTable, reference: MeanReference) -> None:
         self._config, self._most, self._unit = config, most_textures(table), config.radiometry.unit
@@ -97,7 +102,7 @@ class _Measure:
         self._before, self._mirror = (evaluate(self._wi, views) for views in (self._wr, self._mirrored))
 
     def __call__(self, stored: Stored) -> PolarLoss:
-        # every disc of rings holds the mirror directions, whatever its scene
+        # every grid of rings holds the mirror directions, for any scene
         after, mirror = (self._evaluate(stored.textures, views) for views in (self._wr, self._mirrored))
         exposure = self._config.accuracy.exposure_ru
         in_half = self._config.publish.precision == "half"

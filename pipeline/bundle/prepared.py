@@ -1,4 +1,4 @@
-"""A table made ready for a bundle: everything there that depends on its layout."""
+"""A table prepared for a bundle: the parts of the bundle that depend on the layout."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,10 +16,13 @@ Texture = tuple[TableImage, NDArray[np.floating[Any]]]
 
 @dataclass(frozen=True)
 class Prepared:
-    """What one layout brings to a bundle.
+    """The part of a layout in a bundle.
 
-    holds: what the tables' numbers are called, and `conventions` what they mean. images: made one by one as they are
-    asked for, `count` of them. constants: those of the layout's shader, kernels/shaders/.
+    holds: name of the quantity in the tables. conventions: its definition, for the manifest.
+    evaluation: the formula of the look-up, for the manifest. grid: positions and meaning of the texels.
+    images: the tables, `count` in number, made one by one as they are needed.
+    plan, certificate: of the table. loss: the error that storage adds; None where nothing is lost.
+    constants: values of the constants of the layout's shader in kernels/shaders/.
     """
 
     holds: str

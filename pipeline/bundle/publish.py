@@ -1,4 +1,4 @@
-"""The bundle as a folder that stands alone: its files are written, and it is placed under a name of its content."""
+"""Publication: the files of a bundle are written, and the folder gets a name made from the digest of its content."""
 
 import errno
 import shutil
@@ -19,7 +19,7 @@ from pipeline.store.store import Artifact, writing
 
 EVALUATOR, README = "evaluate.py", "README.md"
 TABLES, MAPS, REPORT = "tables", "maps", "report.html"
-_BESIDE = ".publishing-"
+_TEMPORARY = ".publishing-"
 # as pipeline.report.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
 
@@ -32,10 +32,12 @@ def write(
     folder: Path,
     progress: Progress = silent,
 ) -> str:
-    """Writes all files of a bundle into a new folder, and returns the bundle's name, `<name>-<version>+<digest>`.
+    """Writes all files of a bundle into a new folder.
 
-    table: the table's part. inputs: the artifacts of all stages before, by stage. report: the page of `validate`.
-    The digest is over content, so the same content gives the same name.
+    config: the config. table: the layout's part. inputs: the artifacts of all stages before, by stage.
+    report: the page of the stage "validate". folder: made here.
+    progress: called with a step's name and its completed share, 0 to 1.
+    Returns the bundle's name, `<name>-<version>+<digest>`; the same content gives the same name.
     """
     folder.mkdir()
     shutil.copyfile(report, folder / REPORT)
@@ -46,19 +48,20 @@ def write(
 
 
 def place(content: Path, out: Path, name: str) -> Path:
-    """Copies a bundle to `out/name`, where it appears by one rename, and returns that folder.
+    """Copies a bundle to `out/name`, where it appears by one rename.
 
-    A bundle that stands there already stays. Raises DamagedError where it is not what it was, StorageError where the
-    disk refuses.
+    content: folder with the files. out: made where it is missing. name: of the bundle.
+    Returns the folder; an existing bundle of this name is verified and kept.
+    Raises DamagedError where its files have changed; StorageError where a file cannot be written.
     """
     target = out / name
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
-        scratch.remove_abandoned(out, _BESIDE)
+        scratch.remove_abandoned(out, _TEMPORARY)
         if target.exists():
-            _require_unharmed(target)
+            _require_intact(target)
             return target
-        folder = scratch.make(out, _BESIDE)
+        folder = scratch.make(out, _TEMPORARY)
         try:
             _copy(content, folder)
             _move(folder, target)
@@ -67,17 +70,17 @@ def place(content: Path, out: Path, name: str) -> Path:
     return target
 
 
-def _require_unharmed(bundle: Path) -> None:
+def _require_intact(bundle: Path) -> None:
     faults = verify(bundle)
     if faults:
         raise DamagedError(
-            f"{bundle}: this content was published before, and the folder is not what it was: "
+            f"{bundle}: expected the bundle of this content, which was published before, but its files have changed: "
             f"{summary(faults)}. Move it away and publish again"
         )
 
 
 def _copy(content: Path, folder: Path) -> None:
-    """Copies all files below a folder; shutil.copytree would hide the system's error among its own."""
+    """Copies all files below a folder; shutil.copytree would raise its own error and not the system's."""
     for source in sorted(content.rglob("*")):
         target = folder / source.relative_to(content)
         if source.is_dir():
@@ -87,17 +90,17 @@ def _copy(content: Path, folder: Path) -> None:
 
 
 def _move(folder: Path, target: Path) -> None:
-    """Moves a finished bundle to its name; one that another process placed there meanwhile stays, if unharmed."""
+    """Renames a finished bundle to its place; if another process was faster, its bundle is verified and kept."""
     try:
         folder.rename(target)
     except OSError as error:
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-        _require_unharmed(target)
+        _require_intact(target)
 
 
 def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:
-    """Writes every file but report and SHA256SUMS."""
+    """Writes every file except report and SHA256SUMS."""
     tables = _write_tables(table, folder, progress)
     maps = _copy_maps(inputs["render"], folder)
     found = material.medium(config)
@@ -136,7 +139,7 @@ def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], fold
 
 
 def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[TableImage]:
-    """The table's images, and their entries."""
+    """Writes the table's images, and returns their entries in the manifest."""
     (folder / TABLES).mkdir()
     written = []
     for image, pixels in table.images:
@@ -147,7 +150,7 @@ def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[Tab
 
 
 def _copy_maps(render: Artifact, folder: Path) -> list[MapImage]:
-    """The render artifact's maps under maps/, and their entries."""
+    """Copies the maps of the stage "render" to maps/, and returns their entries in the manifest."""
     (folder / MAPS).mkdir()
     copied = []
     for found in render.summary["maps"]:
@@ -170,5 +173,5 @@ def _copy_maps(render: Artifact, folder: Path) -> list[MapImage]:
 
 
 def _write_text(path: Path, text: str) -> None:
-    # one line end everywhere, so that the digest does not depend on the system
+    # the same line ends on every system give the same digest
     path.write_text(text, encoding="utf-8", newline="\n")

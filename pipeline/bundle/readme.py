@@ -1,6 +1,6 @@
-"""README.md of a bundle: what a person who writes a shader needs, with this bundle's numbers.
+"""README.md of a bundle: a page for writers of shaders, with the numbers of the bundle.
 
-templates/ has the text, one page for each layout of tables; kernels/shaders/ has the look-up in GLSL.
+templates/ has the text, one page for each layout; kernels/shaders/ has the look-up in GLSL.
 """
 
 import re
@@ -15,7 +15,11 @@ _CONSTANT = re.compile(r"^(const \w+ (\w+) = )[^;]*;", re.MULTILINE)
 
 
 def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
-    """Write README.md of a bundle; `constants` are those of the shader of its layout."""
+    """Writes README.md of a bundle.
+
+    manifest: of the bundle. constants: values of the constants of the layout's shader, by name.
+    Returns Markdown.
+    """
     layout, certificate = manifest.grid.layout, manifest.certificate
     return template.markdown(
         "pipeline.bundle",
@@ -34,9 +38,11 @@ def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
 
 
 def shader(layout: str, constants: Mapping[str, Constant]) -> str:
-    """Read the look-up of a layout in GLSL, with the constants of a table in place of the file's.
+    """Reads the look-up of a layout in GLSL, with the constants of a table in place of the file's.
 
-    constants: a value for every global constant of the file, by name. Raises ValueError where they are not the same.
+    layout: name of the layout. constants: a value for every global constant of the file, by name.
+    Returns GLSL.
+    Raises ValueError where the names are not those of the file.
     """
     source = files("kernels").joinpath("shaders", f"{layout}.glsl").read_text(encoding="utf-8")
     declared = {name for _, name in _CONSTANT.findall(source)}

@@ -1,4 +1,4 @@
-"""The paper's tables in a bundle: one image for each I_p."""
+"""The paper's tables in a bundle: an image for each I_p."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -26,12 +26,15 @@ _EVALUATION = (
 
 
 def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificate: dict[str, Any]) -> Prepared:
-    """Makes a Taylor table ready for a bundle.
+    """Prepares a Taylor table for a bundle.
 
-    plan, certificate: of the table, for the manifest. Raises AccuracyError where half precision would lose digits.
+    config: its [publish], light, material and scene are read. table: the table.
+    plan, certificate: of the table, for the manifest.
+    Returns the layout's part of the bundle.
+    Raises AccuracyError where half floats would lose digits.
     """
     scale = taylor_storage.scales(table, config.publish.precision)
-    # measured first: it may refuse
+    # measured before anything is written, because this may raise AccuracyError
     loss = taylor_storage.measure(config, table, scale) if config.publish.precision == "half" else None
     entry = TaylorGridEntry(
         layout="taylor", width=table.resolution, height=table.resolution, power=table.power, u_max=grid.U_MAX
@@ -51,7 +54,7 @@ def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificat
 
 
 def _images(config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss | None) -> Iterator[Texture]:
-    """tables/I_00.exr ... and their pixels."""
+    """Yields the entry and the pixels (v, u, RGBA) of tables/I_00.exr, tables/I_01.exr, ..."""
     stored = config.publish.precision
     lost = None if loss is None else taylor_storage.subnormal_shares(table, scale)
     for p, plane in enumerate(taylor_storage.planes(table, scale, stored)):

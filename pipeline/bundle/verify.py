@@ -1,4 +1,4 @@
-"""Verify: is a bundle what it was when it was published, and does it hold what its manifest says?"""
+"""Verification: a bundle's files are those that were published, and agree with its manifest."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 
 def open_bundle(folder: Path) -> "BundleTables":
-    """Read a bundle into memory. Raises DamagedError if it has faults.
+    """Reads a bundle into memory. The code that runs is this project's evaluator, not the bundle's copy.
 
-    The code that runs is this project's evaluator, never the bundle's copy.
+    folder: of the bundle.
+    Raises DamagedError where the bundle has faults.
     """
     from pipeline.bundle.evaluator import BundleTables
 
@@ -30,7 +31,10 @@ def open_bundle(folder: Path) -> "BundleTables":
 
 
 def verify(folder: Path) -> list[str]:
-    """One line for every fault of a bundle; none where it is whole. Reads nothing outside the folder."""
+    """Verifies a bundle. Reads no file outside its folder.
+
+    Returns one line for each fault; an empty list where there is none.
+    """
     if not folder.is_dir():
         return [f"{folder}: no such folder"]
     found, faults = _files(folder)
@@ -45,17 +49,17 @@ def verify(folder: Path) -> list[str]:
     faults += [f"{name} is missing" for name in sums if name not in found]
     faults += [f"{name} was added" for name in sorted(found - sums.keys() - {SUMS})]
     faults += [f"{name} was changed" for name in changed]
-    unharmed = (found & sums.keys()) - set(changed)
-    return faults + _name_faults(folder) + _manifest_faults(folder, unharmed)
+    intact = (found & sums.keys()) - set(changed)
+    return faults + _name_faults(folder) + _manifest_faults(folder, intact)
 
 
 def summary(faults: list[str]) -> str:
-    """The first faults in one line."""
+    """Joins the first three faults to one line."""
     return "; ".join(faults[:3]) + (f" and {len(faults) - 3} more" if len(faults) > 3 else "")
 
 
 def _files(folder: Path) -> tuple[set[str], list[str]]:
-    """The plain files of a bundle, and a line for everything else: a link could lead outside."""
+    """Lists the plain files of a bundle, and a fault for everything else, since a link could lead outside."""
     found, faults = set(), []
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
@@ -67,7 +71,7 @@ def _files(folder: Path) -> tuple[set[str], list[str]]:
 
 
 def _name_faults(folder: Path) -> list[str]:
-    # a link "latest" to a bundle is fine, so the name is that of the folder itself
+    # a link such as "latest" may lead to a bundle, so the name is that of the folder itself
     name, _, shown = folder.resolve().name.rpartition("+")
     expected = checksums.of_sums(folder)
     if name and shown == expected:
@@ -75,9 +79,9 @@ def _name_faults(folder: Path) -> list[str]:
     return [f"the folder is named {folder.resolve().name}, but its content's digest is {expected} ({SUMS})"]
 
 
-def _manifest_faults(folder: Path, unharmed: set[str]) -> list[str]:
-    """Faults of manifest.json and of what it says about the images; only unharmed files are opened."""
-    if MANIFEST not in unharmed:
+def _manifest_faults(folder: Path, intact: set[str]) -> list[str]:
+    """Lists faults of manifest.json and of its statements about images; only intact files are opened."""
+    if MANIFEST not in intact:
         return []
     try:
         manifest = Manifest.model_validate_json((folder / MANIFEST).read_text(encoding="utf-8"))
@@ -87,20 +91,22 @@ def _manifest_faults(folder: Path, unharmed: set[str]) -> list[str]:
         return [f"{MANIFEST}: {'.'.join(str(key) for key in e['loc'])}: {e['msg']}" for e in error.errors()]
     faults = _consistency_faults(folder, manifest)
     for image in (*manifest.tables, *manifest.maps):
-        faults += _image_faults(folder, image, unharmed)
+        faults += _image_faults(folder, image, intact)
     return faults
 
 
 def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
-    """What the manifest says twice must agree."""
+    """Lists contradictions within the manifest, and between it and the folder's name."""
     faults = []
     called = f"{manifest.name}-{manifest.version}"
     if folder.resolve().name.rpartition("+")[0] != called:
-        faults.append(f"{MANIFEST}: is of {called}, but the folder is named {folder.resolve().name}")
+        faults.append(f"{MANIFEST}: describes {called}, but the folder is named {folder.resolve().name}")
     if [table.index for table in manifest.tables] != list(range(len(manifest.tables))):
         faults.append(f"{MANIFEST}: tables: expected index = 0, 1, ... in order")
     if isinstance(manifest.grid, PolarGridEntry) and not _basis_fits(manifest.grid, len(manifest.tables)):
-        faults.append(f"{MANIFEST}: grid: {len(manifest.tables)} tables do not hold what basis and w_terms ask for")
+        faults.append(
+            f"{MANIFEST}: grid: {len(manifest.tables)} tables do not hold the outputs that basis and w_terms need"
+        )
     for table in manifest.tables:
         if table.layout != manifest.grid.layout:
             faults.append(f"{MANIFEST}: {table.file} is not of the grid's layout")
@@ -112,16 +118,16 @@ def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
 
 
 def _basis_fits(grid: PolarGridEntry, images: int) -> bool:
-    """Whether the basis is (outputs, 3, w_terms) for the outputs that the images hold."""
+    """Tells whether the basis is (outputs, 3, w_terms) for the outputs that the images hold."""
     if grid.basis is None:
         return 4 * images == 3 * grid.w_terms
     shapes = {(len(output), *(len(channel) for channel in output)) for output in grid.basis}
     return len(grid.basis) == 4 * images and shapes == {(3, *3 * (grid.w_terms,))}
 
 
-def _image_faults(folder: Path, image: Image, unharmed: set[str]) -> list[str]:
-    """Where an EXR is not what the manifest says; one that is missing or changed was told before."""
-    if image.file not in unharmed:
+def _image_faults(folder: Path, image: Image, intact: set[str]) -> list[str]:
+    """Lists differences between an EXR and its entry in the manifest; changed files have a fault already."""
+    if image.file not in intact:
         return [] if (folder / image.file).exists() else [f"{MANIFEST}: names {image.file}, which is missing"]
     try:
         found = images.describe(folder / image.file)

@@ -1,1 +1,1 @@
-"""The stages: what each reads from the config and from artifacts, and the artifact it makes."""
+"""The stages: the inputs of each from config and store, and the artifact that it makes."""

@@ -1,4 +1,4 @@
-"""A whole bake: every stage of a config, and its results laid out where people look."""
+"""A whole bake: every stage of a config, and the results copied into a folder for people."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -18,7 +18,11 @@ OnStep = Callable[[run.Step, float | None], None]
 
 @dataclass(frozen=True)
 class Results:
-    """The artifacts of a config by stage, and the files laid out: maps, then the report."""
+    """The results of a bake.
+
+    name: the config's. artifacts: the artifact of each stage, by the stage's name.
+    files: the copies in the results' folder: maps (EXR and PNG), then the report.
+    """
 
     name: str
     artifacts: Mapping[str, Artifact]
@@ -26,7 +30,7 @@ class Results:
 
     @property
     def missed_budget(self) -> str | None:
-        """One line where the error that was asked for was not met."""
+        """Returns the error message of a missed error budget; None where it is met or none is set."""
         budget: dict[str, Any] = self.artifacts["validate"].summary["budget"]
         if budget["met"] is not False:
             return None
@@ -39,9 +43,12 @@ class Results:
 def validate(
     config: Config, store: Store, folder: Path, progress: Progress = silent, on_step: OnStep | None = None
 ) -> Results:
-    """Does every stage but the bundle, and copies maps and report out of the store into `folder`.
+    """Runs every stage except the bundle, and copies maps and report from the store into a folder.
 
-    on_step: as in `run.execute`. A missed budget is no fault here: see `Results.missed_budget`.
+    config: the config. store: the store of its artifacts. folder: of the results, made where it is missing.
+    progress: called with a step's name and its completed share, 0 to 1. on_step: as in `run.execute`.
+    Returns the results; a missed budget raises nothing, see `Results.missed_budget`.
+    Raises StorageError where a file cannot be written, and the errors of the stages.
     """
     return _until("validate", config, store, folder, progress, on_step)
 
@@ -49,7 +56,12 @@ def validate(
 def make(
     config: Config, store: Store, folder: Path, progress: Progress = silent, on_step: OnStep | None = None
 ) -> tuple[Results, Path]:
-    """Does every stage, copies maps, report and bundle into `folder`, and returns the bundle's folder, too."""
+    """Runs every stage, and copies maps, report and bundle from the store into a folder.
+
+    Parameters and errors are those of `validate`.
+    Returns the results and the bundle's folder.
+    Raises DamagedError as well, where `folder` already has a bundle of this name whose files have changed.
+    """
     results = _until("bundle", config, store, folder, progress, on_step)
     return results, bundle.place(store.open("bundle", results.artifacts["bundle"].key), folder)
 
@@ -64,7 +76,7 @@ def _until(
 def _lay_out(store: Store, artifacts: Mapping[str, Artifact], folder: Path) -> tuple[Path, ...]:
     maps, report = (store.open(name, artifacts[name].key) for name in ("render", "validate"))
     sources = [*(maps.folder / name for name in sorted(maps.record["files"])), report.folder / REPORT]
-    with writing(folder), scratch.replacing(folder) as beside:
+    with writing(folder), scratch.replacing(folder) as temporary:
         for source in sources:
-            shutil.copyfile(source, beside / source.name)
+            shutil.copyfile(source, temporary / source.name)
     return tuple(folder / source.name for source in sources)

@@ -1,4 +1,4 @@
-"""Bundle: table, maps, validation -> the folder that renderers read, by its manifest."""
+"""The stage "bundle": table, maps and validation -> the folder that renderers read."""
 
 from functools import cache
 from hashlib import sha256
@@ -25,7 +25,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 @cache
 def _sources_digest() -> str:
-    """The digest of all text that ships in bundles: evaluator, shaders and templates."""
+    """Computes the SHA-256 of all text that is shipped in bundles: evaluator, shaders and templates."""
     bundle, shaders = files("pipeline.bundle"), files("kernels").joinpath("shaders")
     sources = [bundle.joinpath("evaluator.py")]
     for folder in (bundle.joinpath("templates"), shaders):
@@ -43,9 +43,12 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 
 def place(artifact: Artifact, out: Path) -> Path:
-    """Copies the bundle of an artifact into `out` and returns its folder; one that stands there already stays.
+    """Copies the bundle of an artifact into a folder; a bundle of the same name is kept.
 
-    Raises DamagedError where it stands and is not what it was, StorageError where the disk refuses.
+    artifact: of this stage. out: the folder, made where it is missing.
+    Returns the bundle's folder, `out/<name>-<version>+<digest>`.
+    Raises DamagedError where that folder exists and its files have changed; StorageError where a file cannot be
+    written.
     """
     from pipeline.bundle import publish
 
@@ -53,6 +56,6 @@ def place(artifact: Artifact, out: Path) -> Path:
 
 
 def stage_of(layout: Layout) -> Stage:
-    """The bundle of a layout: its manifest tells of every stage before."""
+    """Returns the bundle stage of a layout; its inputs are all stages before, because the manifest describes each."""
     inputs = ("surface", layout.transform.name, "table", "render", "validate")
-    return Stage("bundle", 1, inputs, _parameters, _produce)
+    return Stage("bundle", 2, inputs, _parameters, _produce)

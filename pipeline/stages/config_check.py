@@ -1,4 +1,4 @@
-"""Faults of a config that the models alone cannot see, found before any work starts."""
+"""Checks of a config that its models cannot make alone, run before any work starts."""
 
 from pipeline.config.models import Config
 from pipeline.errors import BakeError, ConfigError
@@ -8,13 +8,17 @@ from pipeline.surface.recipes.patch import patch_of
 
 
 def check(config: Config, source: str) -> None:
-    """Raises ConfigError where a recipe does not fit its patch or a light does not cover the wavelengths."""
+    """Checks that a recipe fits its patch, and that illuminant and metal cover the wavelengths.
+
+    config: a valid config. source: its name for messages, such as the file.
+    Raises ConfigError, with the key of each fault.
+    """
     if config.surface.recipe is not None:
         try:
             patch_of(config.surface.recipe)
         except ConfigError as error:
             raise ConfigError(source, error.faults) from None
-    # the default is known to be covered; looking at others costs colour-science's import
+    # the default is covered; a check of another light may import colour-science, which takes a second
     if config.light == Light() and config.material.metal == "Au":
         return
     try:

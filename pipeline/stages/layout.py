@@ -1,4 +1,4 @@
-"""All that the stages know of one table layout."""
+"""The part of a table layout in the stages."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Layout:
-    """The stages of a layout and what the stages after them need of it.
+    """The stages of a layout, and the functions that the other stages need of it.
 
-    transform, table: the stage that transforms the surface, and the stage that makes the table of it.
-    load: the table of an artifact. size: the table's size in words, for a plan.
-    study: the settings whose influence on the error `validate` shows, and a remark on them for the report.
-    settings: rows (name, value) of the report on what the table is made of, from the summaries of both stages.
-    prepare: the table's part of a bundle; raises AccuracyError where what is stored would miss a budget.
+    transform: the stage that transforms the surface. table: the stage that integrates the transform to a table.
+    load: reads the table of an artifact. size: describes the table's size, for a plan.
+    study: returns the curves of error against each setting that `validate` shows, from config, inputs, the table's
+        evaluator and the map on which errors are measured. study_remark: a sentence on them for the report.
+    settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
+    prepare: makes the table's part of a bundle; raises AccuracyError where the stored table would miss a budget.
     """
 
     transform: Stage

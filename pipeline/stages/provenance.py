@@ -1,4 +1,4 @@
-"""What made an artifact: versions and device, told with the artifact, never part of its address."""
+"""The origin of an artifact: versions and device, recorded with the artifact but not part of its address."""
 
 import platform
 from functools import cache
@@ -9,7 +9,7 @@ _LIBRARIES = ("numpy", "scipy", "pyFFTW", "pyopencl", "zarr", "OpenEXR", "colour
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of this tool, Python and the libraries that touch the numbers."""
+    """Returns the versions of this tool, Python and the libraries that compute, by name."""
     found = {"python": platform.python_version()}
     for name in ("diffract-bake", *_LIBRARIES):
         try:
@@ -20,7 +20,10 @@ def versions() -> dict[str, str]:
 
 
 def device() -> dict[str, str]:
-    """The OpenCL device in use: kernels contract multiply-adds as it likes, so bits differ between devices."""
+    """Returns the name and the driver of the OpenCL device in use.
+
+    They are recorded because the last bits differ between devices, which contract multiply-adds differently.
+    """
     from kernels.device import default_device
 
     used = default_device()

@@ -1,4 +1,4 @@
-"""Render: table -> BRDF maps, one for each light, as EXR and PNG."""
+"""The stage "render": table -> BRDF maps, one for each light, as EXR and PNG."""
 
 from pathlib import Path
 from typing import Any
@@ -26,17 +26,17 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def light_direction(light: Direction) -> Array:
-    """The unit vector (3,) towards a light."""
+    """Computes the unit vector (3,) towards a light, away from the surface."""
     return geometry.direction(np.radians(light.theta_deg), np.radians(light.phi_deg))
 
 
 def map_name(light: Direction) -> str:
-    """The stem of a map's files: its light's angles in degrees."""
+    """Returns the file name of a light's map without its suffix: it holds the angles in degrees."""
     return f"map_theta{light.theta_deg:.12g}_phi{light.phi_deg:.12g}"
 
 
 def map_radius(config: Config) -> float:
-    """How far out a map has views: sin(theta_max) of the scene, all without one."""
+    """Computes the radius of a map, sin(theta) of its outermost views: the scene's theta_max, else 1."""
     return 1.0 if config.scene is None else float(np.sin(np.radians(config.scene.views.theta_max_deg)))
 
 

@@ -1,4 +1,4 @@
-"""The order of stages: what a config needs (the plan, a pure function) and doing it."""
+"""The stages of a config in order: the plan, a pure function of config and store, and its execution."""
 
 import time
 from collections.abc import Callable
@@ -22,14 +22,14 @@ UNCHANGED = "nothing it reads has changed"
 
 
 def stages(config: Config) -> tuple[Stage, ...]:
-    """Every stage of a config, in order: a layout has its own transform of the surface and its own table."""
+    """Returns the stages of a config in order; the transform of the surface and the table are the layout's own."""
     layout = layouts.of(config.table)
     return (SURFACE, layout.transform, layout.table, RENDER, validate.stage_of(layout), bundle.stage_of(layout))
 
 
 @dataclass(frozen=True)
 class Step:
-    """One stage of a plan: its address, and whether it stands in the store."""
+    """One stage of a plan: the address of its artifact, and whether the store has it."""
 
     stage: Stage
     key: str
@@ -38,14 +38,17 @@ class Step:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why a step is cached or to do, and its cost, in words."""
+    """The reason why a step is cached or to do, and its cost, as texts."""
 
     reason: str
     cost: str
 
 
 def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
-    """The steps up to and including stage `until`, each cached or to do. Writes nothing."""
+    """Lists the steps that a stage needs, itself last, each cached or to do. Writes nothing.
+
+    config: the config. store: the store of artifacts. until: name of the last stage.
+    """
     keys: dict[str, str] = {}
     needed = _needed(config, until)
     for stage in needed:
@@ -54,19 +57,23 @@ def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
 
 
 def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
-    """What is to be said of each step of a plan; reads the records of the whole store."""
+    """Explains each step of a plan: why it is cached or to do, and its cost. Reads the records of the whole store.
+
+    config: the config of the plan. steps: the plan.
+    Returns one explanation per step.
+    """
     earlier = store.artifacts()
     made = {step.stage.name for step in steps if not step.cached}
-    told = []
+    explanations = []
     for step in steps:
         last = _latest(earlier, step.stage.name, config.name)
         reason = UNCHANGED if step.cached else _reason(step.stage, config, made, last)
-        told.append(Explanation(reason, _cost(step.stage, config, last)))
-    return told
+        explanations.append(Explanation(reason, _cost(step.stage, config, last)))
+    return explanations
 
 
 def _needed(config: Config, until: str) -> list[Stage]:
-    """The stages that `until` needs, in order, itself last."""
+    """Returns the stages that `until` needs, in order, itself last."""
     by_name = {stage.name: stage for stage in stages(config)}
     wanted, queue = {until}, [until]
     while queue:
@@ -84,15 +91,19 @@ def execute(
     progress: Progress = silent,
     on_step: Callable[[Step, float | None], None] | None = None,
 ) -> dict[str, Artifact]:
-    """Makes what a plan says is to do; gives every step's artifact, its record checked but not its files.
+    """Runs the steps of a plan that are to do.
 
-    `on_step` hears of each step: the seconds it took, None where it was cached.
+    config: the config of the plan. steps: the plan. store: where artifacts are read and written.
+    progress: called with a step's name and its completed share, 0 to 1.
+    on_step: called after each step with the seconds that it took, None where it was cached.
+    Returns every step's artifact by stage; its record is checked, its files are not.
+    Raises DeviceError where a step needs a device and none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
     if any(step.stage.uses_device and not step.cached for step in steps):
-        # better now than after the minutes before the first kernel; drivers answer as slowly as zarr is imported
-        with ThreadPoolExecutor(1) as beside:
-            answer = beside.submit(require_device)
+        # a missing device is reported before any work; its driver loads while zarr is imported, which takes as long
+        with ThreadPoolExecutor(1) as pool:
+            answer = pool.submit(require_device)
             import_module("zarr")
             answer.result()
     opened: dict[str, Artifact] = {}
@@ -103,14 +114,14 @@ def execute(
             store.touch(name, step.key)
         else:
             with store.lock(name, step.key):
-                # another run may have made it while we waited
+                # another run may have made it while this one waited for the lock
                 if not store.has(name, step.key):
                     started = time.perf_counter()
                     for needed in set(step.stage.inputs) - set(opened):
                         opened[needed] = store.open(needed, keys[needed])
                     artifacts = {needed: opened[needed] for needed in step.stage.inputs}
                     _make(config, step, Inputs(artifacts, session), store, progress)
-                    # its files were hashed as they were written
+                    # its files were hashed when they were written, so they need no check
                     opened[name] = store.describe(name, step.key)
                     seconds = time.perf_counter() - started
         if on_step is not None:
@@ -137,13 +148,13 @@ def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Pr
 
 
 def _latest(artifacts: list[Artifact], stage: str, name: str) -> Artifact | None:
-    """The artifact of a stage last made or used for a config of this name."""
+    """Finds the artifact of a stage that was made or used last for a config of this name."""
     found = [a for a in artifacts if a.stage == stage and a.record.get("name") == name]
     return max(found, key=lambda a: (a.folder / "artifact.json").stat().st_mtime, default=None)
 
 
 def _reason(stage: Stage, config: Config, made: set[str], last: Artifact | None) -> str:
-    """Why a step is to do: never made, its settings changed, or its inputs will be made."""
+    """Says why a step is to do: never made, changed settings, or an input that will be made."""
     inputs = sorted(made & set(stage.inputs))
     if last is None:
         return "not made before"
@@ -154,11 +165,11 @@ def _reason(stage: Stage, config: Config, made: set[str], last: Artifact | None)
         return f"changed: {', '.join(changed[:3])}" + (f" and {len(changed) - 3} more" if len(changed) > 3 else "")
     if inputs:
         return f"its input will be made: {', '.join(inputs)}"
-    return "its input is another one than last time"
+    return "its input differs from the last one"
 
 
 def _changes(before: Any, now: Any, path: str = "") -> list[str]:
-    """Key paths whose values differ, with both values where they are short."""
+    """Lists the key paths whose values differ, with both values where they are short."""
     if isinstance(before, dict) and isinstance(now, dict):
         keys = sorted(before.keys() | now.keys())
         return [c for k in keys for c in _changes(before.get(k), now.get(k), f"{path}.{k}" if path else k)]
@@ -169,7 +180,7 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
 
 
 def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
-    """The work in the stage's own units, and how long it took the last time."""
+    """Describes the work of a stage, and the time that it took last, in s."""
     texts = {
         "power_spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
         "table": layouts.of(config.table).size(config),

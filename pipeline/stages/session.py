@@ -1,18 +1,18 @@
-"""Objects that the stages of one run hand on in memory, since reading them back takes longer than using them."""
+"""Objects that the stages of one run share in memory, because reading them from disk takes longer than using them."""
 
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
-# what is larger serves the stage that asks for it first, and then leaves its memory to the stages that follow
+# a larger object is released after the stage that asks for it first, to leave its memory to the following stages
 _KEPT_BYTES = 2**28
 
 
 class Sized(Protocol):
-    """An object that knows its size."""
+    """An object with a size in memory."""
 
     @property
     def nbytes(self) -> int:
-        """Bytes of its arrays."""
+        """Size of its arrays, bytes."""
 
 
 T = TypeVar("T", bound=Sized)
@@ -25,11 +25,11 @@ class Session:
         self._objects: dict[str, Any] = {}
 
     def keep(self, name: str, value: Sized) -> None:
-        """Hands an object on to the stages that follow."""
+        """Keeps an object under a name, for the following stages."""
         self._objects[name] = value
 
     def get(self, name: str, make: Callable[[], T]) -> T:
-        """The object of a name, which is made where none is kept."""
+        """Returns the object of a name, or makes it; an object above 256 MiB is not kept for the next call."""
         value: T = self._objects.pop(name) if name in self._objects else make()
         if value.nbytes <= _KEPT_BYTES:
             self._objects[name] = value

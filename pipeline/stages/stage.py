@@ -1,4 +1,4 @@
-"""What every stage is: a pure function from config sections and input artifacts to one artifact."""
+"""The definition of a stage: a pure function from config sections and input artifacts to one artifact."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Summary = dict[str, Any]
 
 @dataclass(frozen=True)
 class Inputs:
-    """The artifacts that a stage reads, by stage, and the objects that stages of this run have in memory."""
+    """The artifacts that a stage reads, by stage, and the objects that the stages of this run share."""
 
     artifacts: Mapping[str, Artifact]
     session: Session = field(default_factory=Session)
@@ -26,7 +26,7 @@ class Inputs:
         return self.artifacts[stage]
 
     def summary(self, stage: str) -> Summary:
-        """What a stage recorded of its artifact."""
+        """Returns the summary in the record of a stage's artifact."""
         found: Summary = self.artifacts[stage].summary
         return found
 
@@ -35,10 +35,11 @@ class Inputs:
 class Stage:
     """One stage.
 
-    version: raised whenever the same parameters would give another artifact.
+    name: of the stage and of its folder in the store.
+    version: increased whenever the same parameters would give another artifact.
     inputs: names of the stages whose artifacts it reads.
-    parameters: everything it reads from the config, as JSON; with the input keys, it addresses the artifact.
-    produce: writes the artifact's files into a folder and returns its summary (JSON).
+    parameters: returns all values that the stage reads from the config, as JSON; they are part of the address.
+    produce: writes the files of the artifact into a folder and returns its summary, as JSON.
     uses_device: whether it launches kernels.
     """
 
@@ -50,7 +51,7 @@ class Stage:
     uses_device: bool = False
 
     def key(self, config: Config, input_keys: Mapping[str, str]) -> str:
-        """The artifact's address."""
+        """Computes the address of the artifact, 64 hex digits, from the config and the addresses of all inputs."""
         return digest.of_json(
             {
                 "stage": self.name,
@@ -62,19 +63,19 @@ class Stage:
 
 
 def kernel_digest(*names: str) -> str:
-    """Computes the digest of the sources of kernels, given by their files' names, with the files that they include."""
+    """Computes the digest of the sources of kernels, by the names of their files, with the files they include."""
     return digest.of_json(source.text(*names))
 
 
 def file_or_name(name: str) -> dict[str, str]:
-    """A value that may name a CSV file, by the file's content."""
+    """Returns the digest of a CSV file, or the name itself where it names no file, as part of an address."""
     if name.lower().endswith(".csv"):
         return {"sha256": digest.of_file(Path(name))}
     return {"name": name}
 
 
 def light_parameters(config: Config) -> dict[str, Any]:
-    """The [spectrum] section, an illuminant's CSV by its content."""
+    """Returns the section [spectrum] as part of an address, with the digest of an illuminant's CSV."""
     section = config.light.model_dump(mode="json")
     if isinstance(config.light.illuminant, str):
         section["illuminant"] = file_or_name(config.light.illuminant)
@@ -82,7 +83,7 @@ def light_parameters(config: Config) -> dict[str, Any]:
 
 
 def material_parameters(config: Config) -> dict[str, Any]:
-    """The [material] section as far as the model chosen reads it, a metal's CSV by its content."""
+    """Returns the keys of [material] that its model reads as part of an address, with the digest of a metal's CSV."""
     section = config.material.model_dump(mode="json")
     section["metal"] = file_or_name(config.material.metal) if config.material.fresnel == "conductor" else None
     if config.material.fresnel in ("none", "conductor"):

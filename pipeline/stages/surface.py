@@ -1,4 +1,4 @@
-"""Surface: a scan file or a recipe -> a levelled, centred height field and its statistics."""
+"""The stage "surface": a scan file or a recipe -> a levelled, centred height field and its statistics."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -18,9 +18,9 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import SurfaceStatistics, measure
 
 _FILE = "surface.zarr"
-# less than this share of the frequencies a view can reach, and the bake would show next to nothing
+# the smallest share of the visible frequencies within the Nyquist limits with which a bake makes sense
 _LEAST_KNOWN = 0.05
-# pitches that differ by more are no rounding of square pixels
+# a larger relative difference of the pitches is not due to the rounding of square pixels
 _SQUARE = 0.01
 
 
@@ -28,7 +28,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     section = {**config.surface.model_dump(mode="json"), "level": config.surface.levelling}
     if config.surface.path is not None:
         section["path"] = {"sha256": digest.of_file(Path(config.surface.path))}
-    # the statistics compare the surface with the window and the wavelengths
+    # the statistics depend on the window and the shortest wavelength
     return {
         "surface": section,
         "sigma_um": config.coherence.sigma_um,
@@ -69,51 +69,55 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
 
 
 def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: float, *, is_scan: bool) -> list[str]:
-    """What a user should know before trusting the bake. Raises InputError for a hopelessly coarse pitch."""
+    """Lists warnings about the surface for the user, one sentence each.
+
+    Raises InputError where nearly all visible frequencies lie beyond the scan's Nyquist limits.
+    """
     found = []
     known = statistics.reach_covered
     pitch = max(statistics.pitch_um)
     finest = 0.25e-3 * lambda_min_nm
     if known < _LEAST_KNOWN:
         raise InputError(
-            f"surface: a pitch of {pitch:g} um tells nothing of {100 * (1 - known):.1f} % of the frequencies that a "
-            f"view can reach at {lambda_min_nm:g} nm; scan with {finest:.3f} um or finer, or use longer wavelengths"
+            f"surface: the pitch of {pitch:g} um is too coarse: {100 * (1 - known):.1f} % of the frequencies visible "
+            f"at {lambda_min_nm:g} nm lie beyond its Nyquist limit; rescan with {finest:.3f} um or finer, or use "
+            "longer wavelengths"
         )
     if known < 0.9995:
         found.append(
             f"the pitch of {pitch:g} um is too coarse for {lambda_min_nm:g} nm: {100 * (1 - known):.1f} % of the "
-            f"frequencies that a view can reach are unknown and taken as dark ({finest:.3f} um would know all)"
+            f"visible frequencies lie beyond its Nyquist limit and count as dark ({finest:.3f} um would cover all)"
         )
     x, y = statistics.pitch_um
     if is_scan and abs(x / y - 1.0) > _SQUARE:
         found.append(
-            f"the pitch differs along x and y ({x:.4g} x {y:.4g} um): right for a scan of fewer lines, wrong for one "
-            "that was cut without its size"
+            f"the pitch differs along x and y ({x:.4g} x {y:.4g} um): this is right for a scan with fewer lines, and "
+            "wrong for a cropped scan whose file still states the original size"
         )
     if min(statistics.windows) < 3.99:
         found.append(
             f"the patch ({statistics.size_um[0]:.4g} x {statistics.size_um[1]:.4g} um) is smaller than the coherence "
-            f"window (4 sigma = {4 * sigma_um:g} um) and repeats under it: repeats are seen as orders of their own, "
-            f"and the seams between them hold {100 * statistics.seam_energy:.2g} % of the heights' energy"
+            f"window (4 sigma = {4 * sigma_um:g} um) and repeats under it: the repetition adds diffraction orders, "
+            f"and the seams between the copies hold {100 * statistics.seam_energy:.2g} % of the heights' energy"
         )
     return found
 
 
 def of(inputs: Inputs) -> HeightField:
-    """The height field that a stage is given."""
+    """Returns the height field of a stage's inputs."""
     return inputs.session.get("height field", lambda: load(inputs["surface"]))
 
 
 def reference_of(config: Config, inputs: Inputs, progress: Progress) -> MeanReference:
-    """The exact reference of the height field that a stage is given: table, validation and bundle share it."""
+    """Returns the exact reference of the height field, which the stages table, validate and bundle share."""
     return inputs.session.get("reference", lambda: exact.reference_of(of(inputs), config, progress))
 
 
 def load(artifact: Artifact) -> HeightField:
-    """The height field of a surface artifact."""
+    """Reads the height field of an artifact of this stage."""
     zarr = artifact.folder / _FILE
     pitch = arrays.attributes(zarr)["pitch_um"]
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 3, (), _parameters, _produce)
+SURFACE = Stage("surface", 4, (), _parameters, _produce)

@@ -1,4 +1,4 @@
-"""Validate: the table against the exact reference, as numbers, plots and one page."""
+"""The stage "validate": errors of the table against the exact reference, as numbers, plots and a page."""
 
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import asdict
@@ -30,7 +30,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    # one thread draws while the device computes what comes next
+    # one thread draws while the device computes the next numbers
     with ThreadPoolExecutor(1) as drawing:
         results, drawn = _measured(config, inputs, drawing, progress)
         pictures = {name: picture.result() for name, picture in drawn.items()}
@@ -45,7 +45,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 def _measured(
     config: Config, inputs: Inputs, drawing: Executor, progress: Progress
 ) -> tuple[Summary, dict[str, Future[bytes]]]:
-    """The numbers of the summary, and the pictures by name as `drawing` makes them."""
+    """Computes the numbers of the summary; returns them and the pictures by name, drawn by the executor."""
     field, layout = surface.of(inputs), layouts.of(config.table)
     drawn = {"surface": drawing.submit(_picture, "height_map", field)}
     evaluate = table_evaluator(layout.load(inputs["table"]), config.radiometry)
@@ -63,7 +63,7 @@ def _measured(
         drawn[f"comparison_{render.map_name(light)}"] = picture
         maps.append({**light.model_dump(), "colour": [asdict(error) for error in check.colour]})
     results: Summary = {
-        # the certificate has both already
+        # both were measured for the certificate
         **{name: inputs.summary("table")["certificate"][name] for name in ("reference", "random")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
@@ -73,7 +73,7 @@ def _measured(
 
 
 def _picture(of: str, *arguments: Any) -> bytes:
-    """A plot by its function's name; matplotlib takes as long to import as a plot to draw, and only here."""
+    """Draws a plot by its function's name, as PNG; matplotlib is imported here because that takes long."""
     png: bytes = getattr(import_module("pipeline.accuracy.plots"), of)(*arguments)
     return png
 
@@ -87,7 +87,7 @@ def _curves(study: convergence.Study, progress: Progress) -> list[convergence.Cu
 
 
 def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
-    """The error asked for beside the largest mean error of the maps at its exposure."""
+    """Compares the allowed error with the largest mean error of the maps at the same exposure."""
     asked, exposure = config.accuracy.delta_e, config.accuracy.exposure_ru
     measured = max(e["mean"] for m in maps for e in m["colour"] if e["exposure_ru"] == exposure)
     met = None if asked is None else measured <= asked
@@ -95,6 +95,6 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def stage_of(layout: Layout) -> Stage:
-    """Validation of a layout: it reads what the table was made of, too."""
+    """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "render")
-    return Stage("validate", 4, inputs, _parameters, _produce, uses_device=True)
+    return Stage("validate", 5, inputs, _parameters, _produce, uses_device=True)

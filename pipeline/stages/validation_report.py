@@ -1,4 +1,4 @@
-"""The validation report: what was baked, how it looks, and how far it is from the truth."""
+"""The validation report: a page with the maps, the surface, the settings and the measured errors."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +15,11 @@ ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max")
 
 
 def error_rows(results: dict[str, Any]) -> Rows:
-    """CIELAB errors of the validate stage's summary, one row a place and exposure."""
+    """Lists the CIELAB errors of a validation, one row of texts for each set of directions and exposure.
+
+    results: the summary of the stage "validate".
+    Returns rows with the columns ERROR_COLUMNS.
+    """
     places = [(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"]) for m in results["maps"]]
     places.append(("random directions", results["random"]["colour"]))
     return [
@@ -37,19 +41,19 @@ def _surface_rows(summary: dict[str, Any]) -> Rows:
         ["g = (2π σ_h / 500 nm)²", f"{s['g']:.3f}"],
         ["dominant periods", periods or "none"],
         [
-            "band limit, beside 2/λ (1/µm)",
+            "Nyquist limits; 2/λ (1/µm)",
             "{:.3g} × {:.3g}, {:.3g}".format(*s["band_limit_per_um"], s["reach_per_um"]),
         ],
-        ["reachable frequencies known", f"{100 * s['reach_covered']:.1f} %"],
+        ["visible frequencies below them", f"{100 * s['reach_covered']:.1f} %"],
         ["rms step across the seams (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["seam_step_um"]))],
-        ["of the heights' energy, in the seams", f"{100 * s['seam_energy']:.2g} %"],
+        ["heights' energy in the seams", f"{100 * s['seam_energy']:.2g} %"],
         ["rms step between samples (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["inner_step_um"]))],
         *_cleaning_rows(summary["conditioning"]),
     ]
 
 
 def _cleaning_rows(done: dict[str, Any]) -> Rows:
-    """What was done to the scan, and to how many samples."""
+    """Lists the steps of conditioning, and the number of samples that each changed."""
     rows = [
         ["holes filled", f"{done['holes']} samples"],
         ["levelled by", f"{done['level']} (rms removed {1e3 * done['removed_rms_um']:.2f} nm)"],
@@ -61,7 +65,12 @@ def _cleaning_rows(done: dict[str, Any]) -> Rows:
 
 
 def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Mapping[str, bytes]) -> str:
-    """The page's text. `results` is the validate stage's summary, `pictures` its plots by name."""
+    """Writes the page.
+
+    config: the config. inputs: those of the stage "validate". results: the stage's summary.
+    pictures: its plots, PNG, by name.
+    Returns HTML.
+    """
     surface, table, render = (inputs.summary(name) for name in ("surface", "table", "render"))
     layout = layouts.of(config.table)
     return template.html(

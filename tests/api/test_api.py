@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipeline import Bundle, bake, load_scan
-from pipeline.bundle.evaluator import Bundle as Evaluator
+from pipeline.bundle.evaluator import BundleTables
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, BakeError, ConfigError, DamagedError, InputError, StorageError
 from pipeline.optics.geometry import direction
@@ -98,7 +98,7 @@ def test_a_bundle_answers_as_its_own_evaluator(bundle: Path) -> None:
     wi, wr = direction([0.2, 0.3, 0.0], [0.0, 1.0, 2.0]), direction([0.4, 0.1, 0.9], [3.0, 0.0, 1.0])
     found = opened.xyz(wi, wr)
     assert found.shape == (3, 3)
-    assert_allclose(found, Evaluator(bundle).xyz(wi, wr), rtol=0, atol=0)
+    assert_allclose(found, BundleTables(bundle).xyz(wi, wr), rtol=0, atol=0)
     # one direction for all of the other's, and lists as well as arrays
     one = opened.xyz([0.0, 0.0, 1.0], wr.tolist())
     assert_allclose(one, opened.xyz(np.tile([0.0, 0.0, 1.0], (3, 1)), wr), rtol=0, atol=0)

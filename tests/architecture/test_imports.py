@@ -1,57 +1,20 @@
-"""The arrows of the design: cli -> pipeline -> kernels, physics apart from stages, heavy libraries on demand."""
+"""Rules of imports: cli -> pipeline -> kernels, physics apart from stages, heavy libraries on demand."""
 
 import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("cli", "pipeline", "kernels")
+from .source import PACKAGES, ROOT, anywhere, imported, relative, sources, tree, within
+
 HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "OpenEXR", "PIL", "SurfaceTopography", "jinja2"}
 STAGE_FREE = ("tables", "fourier", "diffraction", "accuracy", "optics", "surface")
-
-
-def sources(*places):
-    """Python files below folders of the project, or the files themselves."""
-    for place in places:
-        path = ROOT / place
-        yield from sorted(path.rglob("*.py")) if path.is_dir() else [path]
-
-
-def tree(path):
-    return ast.parse(path.read_text(encoding="utf-8"), str(path))
-
-
-def imported(nodes):
-    """Full names of the modules that import statements among the nodes may load."""
-    names = set()
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "packages are imported by their full names"
-            names |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return names
-
-
-def anywhere(path):
-    return imported(ast.walk(tree(path)))
-
-
-def within(names, *packages):
-    """Those of the names that are one of the packages or lie in it."""
-    return {name for name in names if any(name == p or name.startswith(f"{p}.") for p in packages)}
 
 
 def is_script(statement):
     """Whether a statement is `if __name__ == "__main__":`."""
     return isinstance(statement, ast.If) and ast.unparse(statement.test) == "__name__ == '__main__'"
-
-
-def relative(path):
-    return path.relative_to(ROOT).as_posix()
 
 
 def offenders(places, *packages):
@@ -60,14 +23,14 @@ def offenders(places, *packages):
     return {path: names for path, names in found.items() if names}
 
 
-def test_the_walk_sees_imports():
-    """The walk itself finds what is there: a check of nothing would pass everything."""
-    assert all(len(list(sources(room))) > 1 for room in ROOMS)
+def test_imports_are_found():
+    """The search finds imports that exist: a check of nothing would pass everything."""
+    assert all(len(list(sources(package))) > 1 for package in PACKAGES)
     assert within(anywhere(ROOT / "pipeline/stages/run.py"), "pipeline.stages", "numpy") >= {"pipeline.stages.render"}
     assert "pyopencl" in anywhere(ROOT / "kernels/device.py")
 
 
-def test_kernels_stand_alone():
+def test_kernels_import_nothing_above_them():
     """Kernel code knows neither the pipeline nor the command line."""
     assert offenders(["kernels"], "pipeline", "cli") == {}
 
@@ -78,27 +41,33 @@ def test_pipeline_knows_no_command_line():
 
 
 def test_only_the_device_module_talks_to_opencl():
-    """One place opens devices and holds buffers."""
-    assert set(offenders(ROOMS, "pyopencl")) == {"kernels/device.py"}
+    """One module opens devices and holds buffers."""
+    assert set(offenders(PACKAGES, "pyopencl")) == {"kernels/device.py"}
 
 
 def test_only_the_fourier_room_talks_to_fftw():
-    """One room plans transforms and keeps wisdom; the bench measures through it."""
-    found = offenders(ROOMS, "pyfftw")
+    """One room plans transforms and keeps wisdom; the speed measurements use it."""
+    found = offenders(PACKAGES, "pyfftw")
     assert found
     assert {path.rpartition("/")[0] for path in found} == {"pipeline/fourier"}
 
 
 def test_only_the_command_line_evaluates():
-    """Nothing that users bake with depends on what measures it against the literature."""
+    """The code that users bake with does not depend on its comparison with the literature."""
     product = [path for path in (ROOT / "pipeline").iterdir() if path.name not in ("evaluation", "__pycache__")]
     assert offenders([relative(path) for path in product], "pipeline.evaluation") == {}
 
 
 def test_physics_knows_no_stages():
-    """Closed forms, tables and sums run without the store or the order of stages."""
+    """Closed forms, tables and sums run without the order of stages."""
     assert offenders([f"pipeline/{place}" for place in STAGE_FREE], "pipeline.stages") == {}
-    assert offenders(["pipeline/diffraction", "pipeline/optics", "pipeline/tables"], "pipeline.store") == {}
+
+
+def test_closed_forms_and_kernels_know_no_store():
+    """Closed forms, transforms, tables and kernels neither read nor address artifacts."""
+    assert (
+        offenders(["pipeline/optics", "pipeline/diffraction", "pipeline/tables", "kernels"], "pipeline.store") == {}
+    )
 
 
 def test_physics_knows_no_config():
@@ -109,7 +78,7 @@ def test_physics_knows_no_config():
 
 @pytest.mark.parametrize("room", ["pipeline", "kernels"])
 def test_libraries_do_not_print(room):
-    """Text for people is the command line's; what a file does when it is run as a script is its own."""
+    """Only the command line writes text for people; a file that is run as a script may print, too."""
     printing = [
         f"{relative(path)}:{node.lineno}"
         for path in sources(room)
@@ -131,7 +100,7 @@ def test_commands_start_without_heavy_libraries():
     "module", ["pipeline.config.models", "pipeline.store.store", "pipeline.stages.run", "cli.main"]
 )
 def test_planning_loads_no_heavy_library(module):
-    """What a plan needs is there at once: heavy libraries wait for the stage that uses them."""
+    """Planning imports no heavy library: each is imported by the stage that uses it."""
     script = f"import sys, {module}; print(*sorted({HEAVY!r} & sys.modules.keys()))"
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -1,4 +1,4 @@
-"""Small bakes of either layout, made once: a sinusoid's artifacts in a store of the test session."""
+"""Small bakes of both layouts, made once per session: the artifacts of a sinusoid."""
 
 import tempfile
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from pipeline.stages.stage import Inputs
 from pipeline.store.store import Artifact, Store
 
 LAYOUTS = ("taylor", "polar")
-# the polar table is coarse on purpose: its budget lets the bake be quick
+# the polar table is coarse, within a large budget, so that the bake is quick
 TABLES: dict[str, dict[str, Any]] = {
     "taylor": {"layout": "taylor", "resolution": 41, "power": 3.0, "tolerance": 1e-2},
     "polar": {"layout": "polar", "rings": 40, "azimuths": 192, "w_terms": 12},
@@ -28,11 +28,11 @@ SMALL: dict[str, Any] = {
 }
 # one light, and views around the normal
 SCENE: dict[str, Any] = {"lights": [{"theta_deg": 30.0}], "views": {"theta_max_deg": 45.0}}
-LENIENT = 100.0  # a budget that no small table misses
+LENIENT = 100.0  # a budget that every small table meets
 
 
 def small(layout: str = "taylor", **sections: Any) -> Config:
-    """The small config of a layout with some keys of its sections replaced."""
+    """Returns the small config of a layout, with some keys of its sections replaced."""
     document = {**SMALL, "table": TABLES[layout]}
     if layout == "polar":
         document["accuracy"] = {"delta_e": LENIENT}
@@ -75,7 +75,7 @@ class Baker:
 
 
 def publish(config: Config, artifacts: Mapping[str, Artifact], out: Path) -> Path:
-    """The bundle of these artifacts, made by its stage and placed under `out`."""
+    """Makes the bundle of these artifacts by its stage, and copies it to `out`."""
     *_, stage = run.stages(config)
     with tempfile.TemporaryDirectory() as folder:
         summary = stage.produce(config, Inputs(artifacts), Path(folder), silent)

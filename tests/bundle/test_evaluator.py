@@ -1,4 +1,4 @@
-"""The page in the bundle is the tool's own look-up."""
+"""The evaluator that is shipped in a bundle agrees with the look-up of the tool."""
 
 import ast
 import itertools
@@ -32,7 +32,7 @@ SEED = 3
 
 
 def both(bake: Baker, config: Config, out: Path, wi: Array, wr: Array) -> tuple[Array, Array]:
-    """XYZ by the bundle's page and by the tool, as shares of what a mirror gives."""
+    """Computes XYZ by the bundle's evaluator and by the tool, over Y of a mirror."""
     inputs = bake(config)
     expected = table_evaluator(layouts.of(config.table).load(inputs["table"]), config.radiometry)(wi, wr)
     found = open_bundle(publish(config, inputs, out)).xyz(wi, wr)
@@ -54,7 +54,7 @@ def test_it_is_the_tools_look_up(
 def test_it_is_the_tools_polar_look_up(bake: Baker, tmp_path: Path, fresnel: str, normalisation: str) -> None:
     config = small("polar", material={"fresnel": fresnel, "normalisation": normalisation})
     wi, wr = random_pairs(None, 20000, SEED)
-    # the mirror direction and beside it: ring 0 and the rings below it; the rim: those beyond the last
+    # the mirror direction and directions next to it use ring 0 and its mirror images, the rim those beyond the last
     tilted, level = geometry.direction(1.2, np.linspace(0.0, 6.0, 50)), geometry.direction(1.57, np.array([0.7, 0.7]))
     wi = np.concatenate([wi, tilted, tilted, level])
     wr = np.concatenate(
@@ -66,8 +66,8 @@ def test_it_is_the_tools_polar_look_up(bake: Baker, tmp_path: Path, fresnel: str
     assert found.max() > 0.1
 
 
-def test_a_table_without_symmetry_is_looked_up_alike() -> None:
-    """Noise, turned and stretched: every rule of the grid shows, at its origin and at its rim too."""
+def test_a_table_without_symmetry_is_looked_up_equally() -> None:
+    """Noise on a turned and stretched grid tests every rule of the grid, at its origin and its rim as well."""
     rng = np.random.default_rng(5)
     values = rng.normal(size=(24, 3, 4, 96)).astype(np.float32)
     table = PolarTable(values, PolarGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4)))
@@ -82,7 +82,7 @@ def test_a_table_without_symmetry_is_looked_up_alike() -> None:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_what_the_scene_leaves_out_is_nan(bake: Baker, tmp_path: Path, layout: str) -> None:
+def test_directions_outside_the_scene_are_nan(bake: Baker, tmp_path: Path, layout: str) -> None:
     config = small(layout, scene=SCENE, render={"lights": SCENE["lights"]})
     found, expected = both(bake, config, tmp_path, *random_pairs(None, 500, SEED))
     assert 0 < np.isnan(found).sum() < found.size
@@ -103,7 +103,7 @@ def metal(**keys: object) -> Config:
 
 
 @pytest.mark.parametrize("normalisation", ["relative", "absolute"])
-def test_a_shaders_table_of_the_metal_is_as_exact_as_told(normalisation: str) -> None:
+def test_the_metals_table_for_shaders_is_as_exact_as_the_manifest_states(normalisation: str) -> None:
     config = metal(normalisation=normalisation, shadowing=False)
     entry, medium = material.entry(config), material.medium(config)
     assert entry.reflectance_table is not None
@@ -120,7 +120,7 @@ def test_a_metals_bundle_holds_its_table(bake: Baker, tmp_path: Path) -> None:
     folder = publish(metal(), bake(metal()), tmp_path)
     rows = np.loadtxt(folder / "reflectance.csv", delimiter=",", skiprows=1)
     assert rows.shape == (257, 2)
-    # every smooth interface reflects all at grazing incidence
+    # every smooth interface reflects all light at grazing incidence
     assert rows[0] == pytest.approx([0.0, 1.0])
     assert "reflectance.csv" in (folder / "README.md").read_text(encoding="utf-8")
 
@@ -157,7 +157,7 @@ def test_it_runs_as_a_script(bundle: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("row", ["", "0,0,90,0", "1,2,3", "0,0,-1,0", "0,0,x,0", "0,nan,0,0"])
-def test_it_refuses_rows_that_are_no_directions(bundle: Path, tmp_path: Path, row: str) -> None:
+def test_it_refuses_rows_that_are_not_directions(bundle: Path, tmp_path: Path, row: str) -> None:
     csv = tmp_path / "directions.csv"
     csv.write_text(f"{row}\n", encoding="utf-8")
     done = run(bundle, csv)
@@ -167,11 +167,10 @@ def test_it_refuses_rows_that_are_no_directions(bundle: Path, tmp_path: Path, ro
     assert "Traceback" not in done.stderr
 
 
-def test_it_needs_numpy_and_openexr_alone(bundle: Path) -> None:
+def test_it_needs_only_numpy_and_openexr(bundle: Path) -> None:
     text = (bundle / "evaluate.py").read_text(encoding="utf-8")
-    tree = ast.walk(ast.parse(text))
     modules = set()
-    for node in tree:
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         if isinstance(node, ast.ImportFrom):

@@ -1,4 +1,4 @@
-"""Polar tables in a bundle: what the manifest says of them, few textures, half floats, and when they are refused."""
+"""Polar tables in a bundle: their manifest, few textures, half floats, and missed budgets."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from pipeline.tables.evaluate import table_evaluator
 from .conftest import SCENE, Baker, publish, small
 from .test_publish import manifest_of
 
-# between what the table itself keeps and what one texture of it keeps
+# between the error of the table itself and that of one texture of it
 BUDGET = 4.0
 
 
@@ -39,64 +39,64 @@ def published_with(bake: Baker, out: Path, **keys: Any) -> tuple[Path, Manifest]
     return folder, manifest_of(folder)
 
 
-def grid_of(told: Manifest) -> PolarGridEntry:
-    assert isinstance(told.grid, PolarGridEntry)
-    return told.grid
+def grid_of(manifest: Manifest) -> PolarGridEntry:
+    assert isinstance(manifest.grid, PolarGridEntry)
+    return manifest.grid
 
 
-def loss_of(told: Manifest) -> PolarLoss:
-    assert isinstance(told.storage_loss, PolarLoss)
-    return told.storage_loss
+def loss_of(manifest: Manifest) -> PolarLoss:
+    assert isinstance(manifest.storage_loss, PolarLoss)
+    return manifest.storage_loss
 
 
 def test_texels_are_the_tables_coefficients(bake: Baker, bundle: Path) -> None:
-    table, told = polar_table.load(bake(small("polar"))["table"]), manifest_of(bundle)
-    assert [entry.file for entry in told.tables] == [f"tables/T_{q:02d}.exr" for q in range(9)]
-    assert grid_of(told).basis is None
-    assert told.storage_loss is None
+    table, manifest = polar_table.load(bake(small("polar"))["table"]), manifest_of(bundle)
+    assert [entry.file for entry in manifest.tables] == [f"tables/T_{q:02d}.exr" for q in range(9)]
+    assert grid_of(manifest).basis is None
+    assert manifest.storage_loss is None
     outputs = table.values.reshape(table.grid.rings.count, -1, table.grid.azimuths.count)
-    for entry in told.tables:
+    for entry in manifest.tables:
         with OpenEXR.File(str(bundle / entry.file), separate_channels=True) as file:
             pixels = [file.channels()[name].pixels for name in "RGBA"]
         for c, plane in enumerate(pixels):
             np.testing.assert_array_equal(plane, outputs[:, 4 * entry.index + c])
 
 
-def test_the_mapping_told_is_the_grids(bake: Baker, bundle: Path) -> None:
-    table, told = polar_table.load(bake(small("polar"))["table"]), grid_of(manifest_of(bundle))
-    assert (told.height, told.width) == (40, 192)
-    rho = told.r0 * np.sinh(np.arange(told.height) * told.step)
+def test_the_manifests_mapping_is_that_of_the_grid(bake: Baker, bundle: Path) -> None:
+    table, entry = polar_table.load(bake(small("polar"))["table"]), grid_of(manifest_of(bundle))
+    assert (entry.height, entry.width) == (40, 192)
+    rho = entry.r0 * np.sinh(np.arange(entry.height) * entry.step)
     np.testing.assert_allclose(rho, table.grid.rings.rho(), rtol=1e-12)
     phi = table.grid.azimuths.phi()
     u, v = np.cos(phi), np.sin(phi)
-    cos, sin = np.cos(told.axis_rad), np.sin(told.axis_rad)
-    turns = np.arctan2(cos * v - sin * u, told.stretch * (cos * u + sin * v)) / (2.0 * np.pi)
-    column = turns % 1.0 * told.width
-    off = (column - np.arange(told.width) + 0.5 * told.width) % told.width - 0.5 * told.width
+    cos, sin = np.cos(entry.axis_rad), np.sin(entry.axis_rad)
+    turns = np.arctan2(cos * v - sin * u, entry.stretch * (cos * u + sin * v)) / (2.0 * np.pi)
+    column = turns % 1.0 * entry.width
+    off = (column - np.arange(entry.width) + 0.5 * entry.width) % entry.width - 0.5 * entry.width
     np.testing.assert_allclose(off, 0.0, atol=1e-9)
 
 
-def test_the_manifest_tells_certificate_plan_and_stages(bake: Baker, bundle: Path) -> None:
-    inputs, told = bake(small("polar")), manifest_of(bundle)
-    assert told.certificate == TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"])
-    assert (told.plan["w_terms"], told.plan["windows"]) == (12, inputs["power_spectrum"].summary["windows"])
-    assert list(told.provenance.artifacts) == ["surface", "power_spectrum", "table", "render", "validate"]
-    assert told.made_by.stages.keys() == told.provenance.artifacts.keys()
-    assert told.colour.step_nm is None
-    assert told.colour.wavelengths == inputs["table"].summary["wavelengths"]
-    assert told.coverage.unknown_share == inputs["table"].summary["unknown_share"]
+def test_the_manifest_has_certificate_plan_and_stages(bake: Baker, bundle: Path) -> None:
+    inputs, manifest = bake(small("polar")), manifest_of(bundle)
+    assert manifest.certificate == TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"])
+    assert (manifest.plan["w_terms"], manifest.plan["windows"]) == (12, inputs["power_spectrum"].summary["windows"])
+    assert list(manifest.provenance.artifacts) == ["surface", "power_spectrum", "table", "render", "validate"]
+    assert manifest.made_by.stages.keys() == manifest.provenance.artifacts.keys()
+    assert manifest.colour.step_nm is None
+    assert manifest.colour.wavelengths == inputs["table"].summary["wavelengths"]
+    assert manifest.coverage.unknown_share == inputs["table"].summary["unknown_share"]
 
 
 def test_the_readme_shows_the_certificate_and_its_own_numbers(bundle: Path) -> None:
-    text, told = (bundle / "README.md").read_text(encoding="utf-8"), manifest_of(bundle)
-    assert f"RU is {told.certificate.measured:.3g}" in text
+    text, manifest = (bundle / "README.md").read_text(encoding="utf-8"), manifest_of(bundle)
+    assert f"RU is {manifest.certificate.measured:.3g}" in text
     for name, value in (("RINGS", 40), ("AZIMUTHS", 192), ("TEXTURES", 9), ("TERMS", 12)):
         assert f"const int {name} = {value};" in text
-    for name, number in (("R0", grid_of(told).r0), ("STEP", grid_of(told).step)):
+    for name, number in (("R0", grid_of(manifest).r0), ("STEP", grid_of(manifest).step)):
         assert f"const float {name} = {number!r};" in text
 
 
-def test_the_address_of_a_bundle_is_that_of_its_content(bake: Baker) -> None:
+def test_the_address_of_a_bundle_depends_on_config_and_inputs(bake: Baker) -> None:
     keys = {name: artifact.key for name, artifact in bake(small("polar")).items()}
 
     def address(config: Config, inputs: dict[str, str]) -> str:
@@ -117,41 +117,41 @@ def test_the_address_of_a_bundle_is_that_of_its_content(bake: Baker) -> None:
         ({"textures": 100, "precision": "half"}, 9, np.float16),
     ],
 )
-def test_a_bundle_errs_as_it_says(
+def test_a_bundle_has_the_error_that_it_states(
     bake: Baker, tmp_path: Path, keys: dict[str, Any], textures: int, kind: type
 ) -> None:
-    folder, told = published_with(bake, tmp_path, **keys)
+    folder, manifest = published_with(bake, tmp_path, **keys)
     assert verify(folder) == []
-    assert len(told.tables) == textures == loss_of(told).textures
-    with OpenEXR.File(str(folder / told.tables[-1].file), separate_channels=True) as file:
+    assert len(manifest.tables) == textures == loss_of(manifest).textures
+    with OpenEXR.File(str(folder / manifest.tables[-1].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
     table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
     evaluate = open_bundle(folder).xyz
     mirror = wi * [-1.0, -1.0, 1.0]
-    for views, error in ((wr, loss_of(told).added), (mirror, loss_of(told).added_in_mirror)):
+    for views, error in ((wr, loss_of(manifest).added), (mirror, loss_of(manifest).added_in_mirror)):
         found = delta_e(evaluate(wi, views), table(wi, views), error.exposure_ru)
         assert found.mean() == pytest.approx(error.mean, rel=1e-2, abs=1e-4)
     assert f"in {textures} of 9 textures" in (folder / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
-def test_more_textures_err_less(bake: Baker, tmp_path: Path) -> None:
+def test_more_textures_have_a_smaller_error(bake: Baker, tmp_path: Path) -> None:
     errors = [loss_of(published_with(bake, tmp_path, textures=n)[1]).added.mean for n in (1, 3, 6, 9)]
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 1e-9 < errors[-2] < 0.2 * errors[0]
 
 
-def test_half_is_told_what_falls_below_its_digits(bake: Baker, tmp_path: Path) -> None:
-    folder, told = published_with(bake, tmp_path, textures=2, precision="half")
+def test_the_manifest_has_the_share_of_subnormal_halves(bake: Baker, tmp_path: Path) -> None:
+    folder, manifest = published_with(bake, tmp_path, textures=2, precision="half")
     shares = []
-    for entry in told.tables:
+    for entry in manifest.tables:
         with OpenEXR.File(str(folder / entry.file), separate_channels=True) as file:
             pixels = np.abs(np.stack([channel.pixels for channel in file.channels().values()]).astype(np.float32))
         assert 2.0**14 <= pixels.max() <= 2.0**15
         shares.append(np.mean((pixels > 0.0) & (pixels < 2.0**-14)))
         assert entry.half_subnormal_share == pytest.approx(shares[-1])
-    assert loss_of(told).subnormal_share == pytest.approx(np.mean(shares))
+    assert loss_of(manifest).subnormal_share == pytest.approx(np.mean(shares))
 
 
 def budgeted(**publish: Any) -> Any:
@@ -159,7 +159,7 @@ def budgeted(**publish: Any) -> Any:
 
 
 @pytest.mark.slow
-def test_auto_takes_the_fewest_textures_of_the_budget(bake: Baker, tmp_path: Path) -> None:
+def test_auto_takes_the_fewest_textures_within_the_budget(bake: Baker, tmp_path: Path) -> None:
     loss = loss_of(manifest_of(publish(budgeted(), bake(budgeted()), tmp_path)))
     assert loss.error.mean <= BUDGET
     assert 1 < loss.textures < 9
@@ -170,7 +170,7 @@ def test_auto_takes_the_fewest_textures_of_the_budget(bake: Baker, tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_auto_takes_all_where_no_number_keeps_the_budget(
+def test_auto_takes_all_textures_if_no_number_keeps_the_budget(
     bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried = []
@@ -190,14 +190,14 @@ def test_auto_takes_all_where_no_number_keeps_the_budget(
 
 
 @pytest.mark.parametrize("textures", [0, -1, 2.5, "some"])
-def test_textures_are_a_number_of_them(textures: object) -> None:
+def test_textures_must_be_a_positive_number(textures: object) -> None:
     with pytest.raises(ConfigError, match=r"publish\.textures"):
         small("polar", publish={"textures": textures})
 
 
-def test_a_scenes_bundle_knows_its_part(bake: Baker, tmp_path: Path) -> None:
+def test_a_scenes_bundle_states_the_skipped_share(bake: Baker, tmp_path: Path) -> None:
     config = small("polar", scene=SCENE, render={"lights": SCENE["lights"]}, publish={"textures": 3})
-    told = manifest_of(publish(config, bake(config), tmp_path))
-    assert told.coverage.skipped_share == pytest.approx(1.0 - (grid_of(told).rho_max / 2.0) ** 2)
-    assert told.coverage.skipped_share > 0.3
-    assert loss_of(told).error.mean < 10.0
+    manifest = manifest_of(publish(config, bake(config), tmp_path))
+    assert manifest.coverage.skipped_share == pytest.approx(1.0 - (grid_of(manifest).rho_max / 2.0) ** 2)
+    assert manifest.coverage.skipped_share > 0.3
+    assert loss_of(manifest).error.mean < 10.0

@@ -1,4 +1,4 @@
-"""Publishing: what stands in a bundle, under which name, and what never happens to it."""
+"""Publication: the files of a bundle, its name, and folders that exist already or cannot be written."""
 
 import json
 import os
@@ -43,7 +43,7 @@ def test_the_folder_is_named_by_its_content(bundle: Path) -> None:
     assert bundle.name == f"small-1.0.0+{checksums.of_sums(bundle)}"
 
 
-def test_what_a_bundle_holds(bundle: Path) -> None:
+def test_the_files_of_a_bundle(bundle: Path) -> None:
     names = {path.relative_to(bundle).as_posix() for path in bundle.rglob("*") if path.is_file()}
     powers = len(manifest_of(bundle).tables)
     assert names == {
@@ -64,39 +64,39 @@ def test_texels_are_the_table(bake: Baker, bundle: Path) -> None:
         np.testing.assert_array_equal(channels["A"] == 1.0, table.computed)
 
 
-def test_the_mapping_told_is_the_grids(bundle: Path) -> None:
-    told = manifest_of(bundle).grid
-    assert isinstance(told, TaylorGridEntry)
-    t = 2.0 * np.arange(told.width) / (told.width - 1) - 1.0
-    u = told.u_max * np.abs(t) ** told.power * np.sign(t)
-    np.testing.assert_allclose(u, grid.nodes(told.width, told.power), rtol=1e-14, atol=1e-15)
-    assert (told.width, told.height) == (41, 41)
+def test_the_manifests_mapping_is_that_of_the_grid(bundle: Path) -> None:
+    entry = manifest_of(bundle).grid
+    assert isinstance(entry, TaylorGridEntry)
+    t = 2.0 * np.arange(entry.width) / (entry.width - 1) - 1.0
+    u = entry.u_max * np.abs(t) ** entry.power * np.sign(t)
+    np.testing.assert_allclose(u, grid.nodes(entry.width, entry.power), rtol=1e-14, atol=1e-15)
+    assert (entry.width, entry.height) == (41, 41)
 
 
-def test_the_manifest_tells_errors_coverage_and_origin(bake: Baker, bundle: Path) -> None:
-    inputs, told = bake(small()), manifest_of(bundle)
-    assert told.measured_error == inputs["validate"].summary
-    assert told.plan["order"] == inputs["stack"].summary["order"]
-    assert told.coverage.unknown_share == inputs["table"].summary["unknown_share"]
-    # pitch 0.1 um knows frequencies to 5 /um, light of 380 nm asks there at 5 * 0.38
-    assert told.coverage.known_radius == pytest.approx(1.9)
-    assert told.provenance.artifacts == {name: artifact.key for name, artifact in inputs.items()}
-    assert (told.made_by.device, told.made_by.driver) == ("a device", "1.0")
-    assert told.made_by.libraries["zarr"] == "not recorded"
-    assert told.licence == "not stated"
+def test_the_manifest_has_errors_coverage_and_origin(bake: Baker, bundle: Path) -> None:
+    inputs, manifest = bake(small()), manifest_of(bundle)
+    assert manifest.measured_error == inputs["validate"].summary
+    assert manifest.plan["order"] == inputs["stack"].summary["order"]
+    assert manifest.coverage.unknown_share == inputs["table"].summary["unknown_share"]
+    # the Nyquist limit of a pitch of 0.1 um is 5 per um, which light of 380 nm reaches at 5 * 0.38
+    assert manifest.coverage.known_radius == pytest.approx(1.9)
+    assert manifest.provenance.artifacts == {name: artifact.key for name, artifact in inputs.items()}
+    assert (manifest.made_by.device, manifest.made_by.driver) == ("a device", "1.0")
+    assert manifest.made_by.libraries["zarr"] == "not recorded"
+    assert manifest.licence == "not stated"
 
 
-def test_the_scalar_models_domain_is_told(bake: Baker, bundle: Path) -> None:
-    told, statistics = manifest_of(bundle).domain, bake(small())["surface"].summary["statistics"]
+def test_the_manifest_has_the_scalar_models_domain(bake: Baker, bundle: Path) -> None:
+    domain, statistics = manifest_of(bundle).domain, bake(small())["surface"].summary["statistics"]
     finest = scalar_domain.finest_period_um([Period(**period) for period in statistics["periods"]])
-    assert told.lambda_nm == 550.0
-    assert told.period_over_lambda == pytest.approx(finest / 0.55)
+    assert domain.lambda_nm == 550.0
+    assert domain.period_over_lambda == pytest.approx(finest / 0.55)
     found = scalar_domain.place(finest, statistics["sigma_h_um"], 550.0)
-    assert (told.error_of_smooth, told.error_of_edged, told.within) == (found.smooth, found.edged, found.within)
+    assert (domain.error_of_smooth, domain.error_of_edged, domain.within) == (found.smooth, found.edged, found.within)
     assert "The model is scalar" in (bundle / "README.md").read_text(encoding="utf-8")
 
 
-def test_a_licence_is_told(bake: Baker, tmp_path: Path) -> None:
+def test_the_licence_is_stated(bake: Baker, tmp_path: Path) -> None:
     config = small(publish={"licence": "CC-BY-4.0"})
     folder = publish(config, bake(config), tmp_path)
     assert manifest_of(folder).licence == "CC-BY-4.0"
@@ -118,14 +118,14 @@ def test_nothing_of_this_machine_or_moment_is_inside(
         assert not re.search(r"\d{4}-\d\d-\d\d|\d\d:\d\d|seconds", text)
 
 
-def test_files_a_config_names_are_told_by_name_and_content(bake: Baker, tmp_path: Path) -> None:
+def test_files_of_a_config_are_stated_by_name_and_digest(bake: Baker, tmp_path: Path) -> None:
     light = tmp_path / "lamp.csv"
     light.write_text("lambda_nm,power\n360,1\n830,2\n", encoding="utf-8")
     config = small(spectrum={"illuminant": str(light)})
     text = (publish(config, bake(config), tmp_path) / "manifest.json").read_text(encoding="utf-8")
-    told = json.loads(text)["provenance"]["config"]["spectrum"]["illuminant"]
-    assert told["file"] == "lamp.csv"
-    assert len(told["sha256"]) == 64
+    illuminant = json.loads(text)["provenance"]["config"]["spectrum"]["illuminant"]
+    assert illuminant["file"] == "lamp.csv"
+    assert len(illuminant["sha256"]) == 64
     assert str(tmp_path) not in text
 
 
@@ -143,7 +143,7 @@ def test_other_content_is_another_bundle(bake: Baker, bundle: Path) -> None:
     assert verify(bundle) == verify(other) == []
 
 
-def test_a_damaged_folder_is_neither_taken_nor_mended(bake: Baker, tmp_path: Path) -> None:
+def test_a_damaged_folder_is_neither_used_nor_repaired(bake: Baker, tmp_path: Path) -> None:
     folder = publish(small(), bake(small()), tmp_path)
     (folder / "README.md").write_text("changed", encoding="utf-8")
     with pytest.raises(DamagedError, match=r"README\.md was changed.*Move it away"):
@@ -152,7 +152,9 @@ def test_a_damaged_folder_is_neither_taken_nor_mended(bake: Baker, tmp_path: Pat
     assert [path.name for path in tmp_path.iterdir()] == [folder.name]
 
 
-def test_an_interrupted_publish_leaves_nothing(bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_publication_leaves_no_files(
+    bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def interrupted(path: Path, _pixels: object) -> None:
         if path.name == "I_03.exr":
             raise KeyboardInterrupt
@@ -164,25 +166,25 @@ def test_an_interrupted_publish_leaves_nothing(bake: Baker, tmp_path: Path, monk
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_place_that_cannot_be_written_is_told(bake: Baker, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_an_error(bake: Baker, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(StorageError, match="cannot be written"):
         publish(small(), bake(small()), tmp_path / "file" / "out")
 
 
-def test_an_exr_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_an_exr_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="disk full"):
         images.write_rgba(tmp_path / "none" / "a.exr", np.zeros((2, 2, 4), np.float32))
 
 
-def test_everybody_may_read_a_bundle(bundle: Path) -> None:
+def test_every_user_may_read_a_bundle(bundle: Path) -> None:
     umask = os.umask(0)
     os.umask(umask)
     assert stat.S_IMODE(bundle.stat().st_mode) == 0o777 & ~umask
 
 
-def test_a_scene_leaves_texels_out(bake: Baker, tmp_path: Path) -> None:
+def test_a_scene_skips_texels(bake: Baker, tmp_path: Path) -> None:
     config = small(scene=SCENE, render={"lights": SCENE["lights"]})
-    told = manifest_of(publish(config, bake(config), tmp_path))
-    assert told.coverage.skipped_share > 0.3
-    assert told.provenance.config["scene"]["views"]["theta_max_deg"] == 45.0
+    manifest = manifest_of(publish(config, bake(config), tmp_path))
+    assert manifest.coverage.skipped_share > 0.3
+    assert manifest.provenance.config["scene"]["views"]["theta_max_deg"] == 45.0

@@ -1,4 +1,4 @@
-"""The look-ups in GLSL are compiled, as files and with the numbers of a bundle, for desktops and for GLES."""
+"""The look-ups in GLSL compile for desktops and GLES, as files and with the constants of a bundle."""
 
 import re
 import shutil
@@ -32,7 +32,7 @@ def source(layout: str) -> str:
 
 
 def compiled(text: str, version: str, folder: Path) -> str:
-    """What the compiler and linker print of a fragment shader that calls the look-up; nothing where all is well."""
+    """Compiles and links a fragment shader that calls the look-up; returns the printed faults, '' if it has none."""
     shader = folder / "look_up.frag"
     shader.write_text(f"#version {version}\n{text}{MAIN}", encoding="utf-8")
     done = subprocess.run([COMPILER, "-l", str(shader)], capture_output=True, text=True, check=False)
@@ -59,7 +59,7 @@ def test_a_fault_is_found(tmp_path: Path) -> None:
     [("taylor", {}), ("polar", {}), ("polar", {"textures": 2, "precision": "half"})],
     ids=["taylor", "polar", "low rank"],
 )
-def test_what_a_bundle_shows_compiles(
+def test_the_look_up_in_a_readme_compiles(
     bake: Baker, layout: str, keys: dict[str, Any], version: str, tmp_path: Path
 ) -> None:
     config = small(layout, publish=keys)
@@ -71,7 +71,7 @@ def test_what_a_bundle_shows_compiles(
     assert ("const bool LOW_RANK = true;" in shown[1]) == ("textures" in keys)
 
 
-def test_constants_take_the_places_of_the_files() -> None:
+def test_a_tables_constants_replace_those_of_the_file() -> None:
     text = readme.shader("taylor", {"POWERS": 7, "N": 41.0, "A": 1e-5})
     for line in ("const int POWERS = 7;", "const float N = 41.0;", "const float A = 1e-05;"):
         assert line in text
@@ -80,6 +80,6 @@ def test_constants_take_the_places_of_the_files() -> None:
 
 
 @pytest.mark.parametrize("constants", [{"POWERS": 7, "N": 41.0}, {"POWERS": 7, "N": 41.0, "A": 1.0, "B": 2.0}])
-def test_constants_are_those_of_the_file(constants: dict[str, float]) -> None:
+def test_other_constants_than_the_files_are_refused(constants: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"taylor\.glsl declares \['A', 'N', 'POWERS'\]"):
         readme.shader("taylor", constants)

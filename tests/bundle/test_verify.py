@@ -1,4 +1,4 @@
-"""Verify finds whatever differs, and reads nothing outside the folder."""
+"""Verification finds every difference, and reads nothing outside the folder."""
 
 import hashlib
 import json
@@ -26,27 +26,27 @@ def whole(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def bundle(whole: Path, tmp_path: Path) -> Path:
-    """A copy to do harm to."""
+    """A copy that a test may damage."""
     return Path(shutil.copytree(whole, tmp_path / whole.name))
 
 
-def forged(folder: Path, harm: Callable[[Path], None]) -> Path:
-    """A bundle changed and then sealed again under its new digest: only the manifest can tell."""
-    harm(folder)
+def forged(folder: Path, damage: Callable[[Path], None]) -> Path:
+    """Changes a bundle and renames it to its new digest, so that only the manifest contradicts."""
+    damage(folder)
     (folder / checksums.SUMS).unlink()
     return folder.rename(folder.parent / f"{folder.name.rpartition('+')[0]}+{checksums.write(folder)}")
 
 
 def replacing(before: str, after: str) -> Callable[[Path], None]:
-    """Harm to the manifest's text."""
+    """Returns a function that replaces a text in the manifest of a bundle."""
 
-    def harm(folder: Path) -> None:
+    def damage(folder: Path) -> None:
         path = folder / "manifest.json"
         text = path.read_text(encoding="utf-8")
         assert before in text
         path.write_text(text.replace(before, after, 1), encoding="utf-8")
 
-    return harm
+    return damage
 
 
 def names(folder: Path) -> list[str]:
@@ -95,7 +95,7 @@ def test_a_link_to_a_bundle_is_a_bundle(bundle: Path) -> None:
     assert verify(bundle.parent / "latest") == []
 
 
-def test_a_folder_that_is_none(tmp_path: Path) -> None:
+def test_a_missing_folder_is_a_fault(tmp_path: Path) -> None:
     assert "no such folder" in verify(tmp_path / "none")[0]
 
 
@@ -124,7 +124,7 @@ def test_nothing_outside_is_read(bundle: Path, monkeypatch: pytest.MonkeyPatch) 
     assert any("is not '<sha256>  <file>'" in fault for fault in faults)
 
 
-def test_sums_that_are_no_text(bundle: Path) -> None:
+def test_checksums_that_are_not_text(bundle: Path) -> None:
     (bundle / checksums.SUMS).write_bytes(b"\xff\xfe")
     assert verify(bundle) == ["SHA256SUMS is not UTF-8 text"]
 
@@ -136,61 +136,61 @@ def test_sums_that_are_no_text(bundle: Path) -> None:
         ('"schema_version": 3', '"schema_version": 3, "more": 0', "more"),
         ('"file": "tables/I_00.exr"', '"file": "../I_00.exr"', "tables.0.taylor.file"),
         ('"file": "tables/I_00.exr"', '"file": "tables/none.exr"', "names tables/none.exr, which is missing"),
-        ('"version": "1.0.0"', '"version": "1.0.1"', "is of small-1.0.1"),
+        ('"version": "1.0.0"', '"version": "1.0.1"', "describes small-1.0.1"),
         ('"index": 0', '"index": 7', "expected index = 0, 1"),
         ('"height": 41', '"height": 43', "not of the grid's size"),
         ('"precision": "float"', '"precision": "half"', "not RGBA of precision half"),
     ],
 )
-def test_a_manifest_that_contradicts(bundle: Path, before: str, after: str, fault: str) -> None:
+def test_a_manifest_that_contradicts_the_bundle(bundle: Path, before: str, after: str, fault: str) -> None:
     assert any(fault in line for line in verify(forged(bundle, replacing(before, after))))
 
 
 @pytest.mark.parametrize(
     ("before", "after", "fault"),
     [
-        ('"w_terms": 12', '"w_terms": 8', "do not hold what basis and w_terms ask for"),
+        ('"w_terms": 12', '"w_terms": 8', "do not hold the outputs that basis and w_terms need"),
         ('"layout": "polar",\n   "index": 0', '"layout": "taylor",\n   "index": 0', "tables.0.taylor"),
-        ('"basis": null', '"basis": [[[1.0]]]', "do not hold what basis and w_terms ask for"),
+        ('"basis": null', '"basis": [[[1.0]]]', "do not hold the outputs that basis and w_terms need"),
     ],
 )
-def test_a_polar_manifest_that_contradicts(bake: Baker, tmp_path: Path, before: str, after: str, fault: str) -> None:
+def test_a_polar_manifest_that_contradicts_the_bundle(
+    bake: Baker, tmp_path: Path, before: str, after: str, fault: str
+) -> None:
     folder = publish(small("polar"), bake(small("polar")), tmp_path)
     assert any(fault in line for line in verify(forged(folder, replacing(before, after))))
 
 
 def test_tables_of_another_layout_than_the_grid_are_found(bake: Baker, tmp_path: Path) -> None:
-    def harm(folder: Path) -> None:
+    def damage(folder: Path) -> None:
         path = folder / "manifest.json"
         manifest = json.loads(path.read_text(encoding="utf-8"))
         manifest["tables"][1] |= {"layout": "taylor", "scale": 1.0}
         path.write_text(json.dumps(manifest), encoding="utf-8")
 
     folder = publish(small("polar"), bake(small("polar")), tmp_path)
-    assert verify(forged(folder, harm)) == ["manifest.json: tables/T_01.exr is not of the grid's layout"]
+    assert verify(forged(folder, damage)) == ["manifest.json: tables/T_01.exr is not of the grid's layout"]
 
 
 @pytest.mark.parametrize(
     ("size", "kind", "fault"),
     [((40, 41), np.float32, "height is 40"), ((41, 41), np.float16, "pixel_type is half")],
 )
-def test_an_image_that_is_not_what_the_manifest_says(
-    bundle: Path, size: tuple[int, int], kind: type, fault: str
-) -> None:
+def test_an_image_that_differs_from_its_entry(bundle: Path, size: tuple[int, int], kind: type, fault: str) -> None:
     path = "tables/I_01.exr"
     folder = forged(bundle, lambda folder: images.write_rgba(folder / path, np.zeros((*size, 4), kind)))
     assert any(line.startswith(f"{path}: {fault}") for line in verify(folder))
 
 
-def test_an_image_that_is_none(bundle: Path) -> None:
-    def harm(folder: Path) -> None:
+def test_a_file_that_is_not_an_image(bundle: Path) -> None:
+    def damage(folder: Path) -> None:
         (folder / "tables" / "I_01.exr").write_text("no image", encoding="utf-8")
 
-    folder = forged(bundle, harm)
+    folder = forged(bundle, damage)
     assert verify(folder) == ["tables/I_01.exr cannot be read as EXR"]
 
 
-def test_a_damaged_bundle_gives_no_light(bundle: Path) -> None:
+def test_a_damaged_bundle_is_not_opened(bundle: Path) -> None:
     (bundle / "evaluate.py").unlink()
     with pytest.raises(DamagedError, match=r"evaluate\.py is missing"):
         open_bundle(bundle)

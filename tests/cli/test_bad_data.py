@@ -167,17 +167,17 @@ def test_a_pitch_too_coarse_is_said_with_the_share(tool: Tool) -> None:
     warned = tool("run", tool.config(surface={"path": str(scan), **UNITS, "pitch_um": 0.2}, accuracy={}))
     assert warned.code == 0
     (line,) = (line for line in warned.stderr.splitlines() if line.startswith("warning:"))
-    share = re.search(r"([0-9.]+) % of the frequencies", line)
+    share = re.search(r"([0-9.]+) % of the visible frequencies", line)
     assert share is not None
     assert 10.0 < float(share[1]) < 60.0
     assert "too coarse for 540 nm" in line
-    assert "0.135 um would know all" in line
+    assert "0.135 um would cover all" in line
     assert line.removeprefix("warning: small: ") in (tool.out / "small" / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_hopeless_pitch_is_refused(tool: Tool) -> None:
     result = bake(tool, npy(tool, HILLS), height_unit="um", pitch_um=2.0)
-    refused(tool, result, "tells nothing of 9", "0.135 um or finer")
+    refused(tool, result, "too coarse: 9", "0.135 um or finer")
 
 
 def test_holes_and_dust_are_corrected_and_counted(tool: Tool) -> None:

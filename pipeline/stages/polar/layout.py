@@ -24,7 +24,7 @@ def _size(config: Config) -> str:
 
 
 def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
-    """Rings, azimuths, terms in |w| and wavelength step."""
+    """Returns the curves of error against rings, azimuths, terms in |w| and wavelength step."""
     layout, planned = power_spectrum.layout_of(config), power_spectrum.planned(inputs["power_spectrum"])
     has_steps = inputs.summary("table")["wavelengths"] > 1
     return PolarStudy(power_spectrum.of(inputs), planned, layout, evaluate, coarse).curves(has_steps)
@@ -34,17 +34,17 @@ def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
     rings, azimuths, certificate = table["rings"], table["azimuths"], table["certificate"]
     return [
         ["Chebyshev terms, nodes in s", f"{power_spectrum['terms']}, {power_spectrum['s_nodes']}"],
-        ["windows averaged, contrast left", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
+        ["windows, speckle contrast", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
         ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
-        ["rings even below ρ =", f"{rings['r0']:.3g}"],
+        ["rings evenly spaced below ρ =", f"{rings['r0']:.3g}"],
         [
-            "azimuths crowd by, about",
+            "azimuths denser by, around",
             f"{1.0 / azimuths['stretch']:.2f}, {math.degrees(azimuths['axis_rad']):.0f}°",
         ],
         ["terms in |w|", str(table["w_terms"])],
-        ["wavelengths a ring", f"{table['wavelengths_mean']:.0f} on average, {table['wavelengths']} at most"],
-        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
-        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
+        ["wavelengths per ring", f"{table['wavelengths_mean']:.0f} on average, {table['wavelengths']} at most"],
+        ["beyond the Nyquist limits", f"{100 * table['unknown_share']:.2f} %"],
+        ["outside the scene", f"{100 * table['skipped_share']:.1f} %"],
         [
             f"certificate: mean ΔE at {certificate['exposure_ru']:g} RU",
             f"{certificate['measured']:.3f} of {certificate['delta_e']:g} allowed",
@@ -70,7 +70,7 @@ LAYOUT = Layout(
     load=table.load,
     size=_size,
     study=_study,
-    study_remark="Azimuths are thinned; the step is one for all rings, beside the mean of those chosen ring by ring.",
+    study_remark="Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked.",
     settings=_settings,
     prepare=_prepare,
 )

@@ -1,4 +1,4 @@
-"""Power spectrum: height field -> E(r, phi, s) on a polar grid, which knows no illuminant and no observer."""
+"""The stage "power_spectrum": height field -> E(r, phi, s) on a polar grid, for any illuminant and observer."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -21,12 +21,12 @@ from pipeline.tables.planning import plan
 from pipeline.tables.polar.layout import PolarLayout
 
 _FILE = "power_spectrum.zarr"
-# from the stack to tables of a power spectrum: the plan measures with them
+# the kernels from the stack to a table: the plan measures errors of tables
 PLANNING_KERNELS = ("dft_stack.cl", "spectral_operator.cl", "cubic_spline.cl")
 
 
 def layout_of(config: Config) -> PolarLayout:
-    """The [table] section of a config whose stages are the polar ones."""
+    """Returns the section [table] of a config with the polar layout."""
     assert isinstance(config.table, PolarLayout)
     return config.table
 
@@ -44,7 +44,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _wavelengths(config: Config) -> dict[str, Any]:
-    """A line or a range: all of the light that a power spectrum depends on."""
+    """Returns the wavelengths, a line or a range, nm: a power spectrum depends on nothing else of the light."""
     light = config.light
     if light.is_line:
         return {"lambda_nm": light.lambda_min_nm}
@@ -52,7 +52,7 @@ def _wavelengths(config: Config) -> dict[str, Any]:
 
 
 def budget(config: Config) -> plan.Budget:
-    """What a config's tables are planned for."""
+    """Returns the error budget for which a config's tables are planned."""
     return plan.Budget(config.budget_delta_e, config.accuracy.exposure_ru)
 
 
@@ -90,19 +90,19 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 
 def planned(artifact: Artifact) -> plan.Plan:
-    """The plan of a power spectrum artifact."""
+    """Reads the plan in the record of an artifact of this stage."""
     found = {key: artifact.summary[key] for key in ("terms", "s_nodes", "w_terms", "probed_delta_e")}
     azimuths, rings = Azimuths(**artifact.summary["azimuths"]), Rings(**artifact.summary["rings"])
     return plan.Plan(azimuths=azimuths, rings=rings, **found)
 
 
 def of(inputs: Inputs) -> power_spectrum.PolarPowerSpectrum:
-    """The power spectrum that a stage is given."""
+    """Returns the power spectrum of a stage's inputs."""
     return inputs.session.get("power spectrum", lambda: load(inputs["power_spectrum"]))
 
 
 def load(artifact: Artifact) -> power_spectrum.PolarPowerSpectrum:
-    """The power spectrum of an artifact."""
+    """Reads the power spectrum of an artifact of this stage."""
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     return power_spectrum.PolarPowerSpectrum(
@@ -116,7 +116,7 @@ def load(artifact: Artifact) -> power_spectrum.PolarPowerSpectrum:
 
 
 def _on_a_cache_line(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same where a device that shares this memory reads it without a copy, every time a table is made of it."""
+    """Copies values once to aligned memory, from which a device that shares it reads without a copy per table."""
     placed = device.empty(values.shape, values.dtype)
     placed[...] = values
     return placed

@@ -1,4 +1,4 @@
-"""Table: power spectrum, light and material -> the polar table of XYZ, with its certificate."""
+"""The stage "table": power spectrum, light and material -> the polar table of XYZ, with its certificate."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -25,7 +25,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernels": kernel_digest(*power_spectrum.PLANNING_KERNELS, "exact_power.cl"),
         "spectrum": light_parameters(config),
-        # the certificate is over colours, so all of the material counts
+        # the certificate measures colours, so it depends on the whole material
         "material": material_parameters(config),
         "accuracy": config.accuracy.model_dump(mode="json"),
     }
@@ -73,7 +73,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 
 def load(artifact: Artifact) -> polar.PolarTable:
-    """The table of a polar table artifact."""
+    """Reads the table of an artifact of this stage."""
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     grid = PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))

@@ -21,7 +21,7 @@ def _size(config: Config) -> str:
 
 
 def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
-    """Terms, wavelength step, resolution and exponent of the grid."""
+    """Returns the curves of error against terms, wavelength step, resolution and exponent of the grid."""
     has_steps = inputs.summary("table")["wavelengths"] > 1
     return TaylorStudy(stack.of(inputs), stack.layout_of(config), evaluate, coarse).curves(has_steps)
 
@@ -34,8 +34,8 @@ def _settings(stack: Summary, table: Summary) -> list[list[str]]:
         ["wavelengths", str(table["wavelengths"])],
         ["window reach (coefficients)", "±{} × ±{}".format(*stack["window_reach"])],
         ["predicted error of |P|²", f"{stack['predicted_error']:.1e}"],
-        ["beyond the scan's band", f"{100 * table['unknown_share']:.2f} %"],
-        ["skipped: no view reaches it", f"{100 * table['skipped_share']:.1f} %"],
+        ["beyond the Nyquist limits", f"{100 * table['unknown_share']:.2f} %"],
+        ["outside the scene", f"{100 * table['skipped_share']:.1f} %"],
         [
             f"certificate: mean ΔE at {table['certificate']['exposure_ru']:g} RU",
             f"{table['certificate']['measured']:.3f}",
@@ -60,7 +60,7 @@ LAYOUT = Layout(
     load=table.load,
     size=_size,
     study=_study,
-    study_remark="Terms and step are varied at the views themselves, without a grid between.",
+    study_remark="Terms and step are varied at the directions of the map itself, without a grid.",
     settings=_settings,
     prepare=_prepare,
 )

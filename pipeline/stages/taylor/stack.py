@@ -1,4 +1,4 @@
-"""Stack: height field -> the DFT of every Taylor term, over the frequencies a view can reach."""
+"""The stage "stack": height field -> the DFT of every Taylor term at the visible frequencies."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ _FILE = "stack.zarr"
 
 
 def layout_of(config: Config) -> TaylorLayout:
-    """The [table] section of a config whose stages are the paper's."""
+    """Returns the section [table] of a config with the paper's layout."""
     assert isinstance(config.table, TaylorLayout)
     return config.table
 
@@ -85,12 +85,12 @@ def _save(built: dft_stack.Stack, path: Path) -> None:
 
 
 def of(inputs: Inputs) -> dft_stack.Stack:
-    """The stack that a stage is given."""
+    """Returns the stack of a stage's inputs."""
     return load(inputs["stack"])
 
 
 def load(artifact: Artifact) -> dft_stack.Stack:
-    """The stack of a stack artifact."""
+    """Reads the stack of an artifact of this stage."""
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     for pair in ("spacing_per_um", "reach", "band_per_um"):

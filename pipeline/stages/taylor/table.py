@@ -1,4 +1,4 @@
-"""Table: Taylor stack, light and material -> I_p(u, v) in X, Y and Z."""
+"""The stage "table": Taylor stack, light and material -> I_p(u, v) in X, Y and Z, with its certificate."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -25,7 +25,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernel": kernel_digest("taylor_table.cl", "dft_stack.cl", "exact_power.cl"),
         "spectrum": light_parameters(config),
-        # the certificate is over colours, so all of the material counts
+        # the certificate measures colours, so it depends on the whole material
         "material": material_parameters(config),
         "table": config.table.model_dump(mode="json"),
         "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
@@ -66,7 +66,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 
 def load(artifact: Artifact) -> taylor.TaylorTable:
-    """The table of a table artifact."""
+    """Reads the table of an artifact of this stage."""
     zarr = artifact.folder / _FILE
     values, computed, unknown = (arrays.load(zarr, name) for name in ("I_p", "computed", "unknown"))
     return taylor.TaylorTable(values, computed, unknown, float(arrays.attributes(zarr)["power"]))
