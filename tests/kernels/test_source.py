@@ -7,7 +7,7 @@ import pyopencl
 import pytest
 
 from kernels import device, source
-from pipeline.diffraction.upload import kernel_digest
+from pipeline.stages.stage import kernel_digest
 
 FILES = {
     "shared.cl": "#define SHARED 1\n",
