@@ -63,11 +63,10 @@ def test_physics_knows_no_stages():
     assert offenders([f"pipeline/{place}" for place in STAGE_FREE], "pipeline.stages") == {}
 
 
-def test_closed_forms_and_kernels_know_no_store():
-    """Closed forms, transforms, tables and kernels neither read nor address artifacts."""
-    assert (
-        offenders(["pipeline/optics", "pipeline/diffraction", "pipeline/tables", "kernels"], "pipeline.store") == {}
-    )
+def test_physics_and_kernels_know_no_store():
+    """Closed forms, sums, tables and kernels neither read nor address artifacts."""
+    places = ["pipeline/optics", "pipeline/diffraction", "pipeline/tables", "kernels"]
+    assert offenders(places, "pipeline.store") == {}
 
 
 def test_physics_knows_no_config():
