@@ -26,7 +26,7 @@ DEFAULT_DELTA_E = 0.1
 class Accuracy(Validated):
     """The error budget: a config's [accuracy].
 
-    delta_e: allowed mean CIELAB error; without it, polar tables are planned for 0.1 and no limit is enforced.
+    delta_e: allowed mean CIELAB error; without it, polar tables have to keep 0.1, and the paper's have no limit.
     exposure_ru: the exposure of that error, RU.
     """
 
