@@ -3,7 +3,6 @@
 Levelling and clipping use valid samples only. Holes are therefore filled last, from neighbours without tilt and dust.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +10,10 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.errors import InputError
+from pipeline.surface.fill import fill_holes
 from pipeline.surface.heightfield import HeightField
 
 Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
 
 LEVELS = ("none", "plane", "quadratic", "rows")
 
@@ -185,57 +184,3 @@ def _clip(
         range_kept=(high - low) / before if before > 0 else 1.0,
     )
     return np.clip(heights, low, high), record
-
-
-# --- holes -------------------------------------------------------------------------------------------
-
-
-def fill_holes(heights_um: Array, valid: Mask, pitch_um: tuple[float, float]) -> Array:
-    """Fills holes by a solution of Laplace's equation.
-
-    Each filled sample is the mean of its neighbours within the patch, weighted by 1 / pitch^2. A harmonic function
-    has its extremes on the boundary: up to rounding, no filled height lies outside the range of the valid samples
-    around its hole.
-
-    heights_um: (ny, nx), um. valid: bool (ny, nx), at least one sample true. pitch_um: along (x, y), um.
-    Returns (ny, nx), um, with unchanged valid samples.
-    """
-    # the import takes a tenth of a second, and most scans have no holes
-    from scipy import sparse
-    from scipy.sparse.linalg import spsolve
-
-    hole = ~valid
-    heights = heights_um.ravel()
-    unknown = np.flatnonzero(hole)
-    number = np.full(hole.size, -1)
-    number[unknown] = np.arange(unknown.size)
-    diagonal, known = np.zeros(unknown.size), np.zeros(unknown.size)
-    # the first block is empty, because isolated holes have no links to other holes
-    blocks = [sparse.csr_array((unknown.size, unknown.size))]
-    for mine, there, weight in _neighbours(unknown, hole.shape, pitch_um):
-        other = number[there]
-        inner = other >= 0
-        np.add.at(diagonal, mine, weight)
-        np.add.at(known, mine[~inner], weight * heights[there[~inner]])
-        links = (np.full(np.count_nonzero(inner), -weight), (mine[inner], other[inner]))
-        blocks.append(sparse.csr_array(links, shape=(unknown.size, unknown.size)))
-    matrix = sum(blocks[1:], blocks[0]) + sparse.diags_array(diagonal)
-    filled = heights_um.copy()
-    filled.ravel()[unknown] = spsolve(matrix.tocsc(), known)
-    return filled
-
-
-def _neighbours(
-    samples: Index, shape: tuple[int, ...], pitch_um: tuple[float, float]
-) -> Iterator[tuple[Index, Index, float]]:
-    """Lists the neighbours of samples (flat indices) within the patch, for each of the four directions.
-
-    Yields which of the samples have a neighbour there, the neighbours' flat indices, and their weight.
-    """
-    ny, nx = shape
-    j, i = np.divmod(samples, nx)
-    # only the ratio of the weights matters: it is 1 along the finer axis
-    finest = min(pitch_um)
-    for dj, di in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-        mine = np.flatnonzero((j + dj >= 0) & (j + dj < ny) & (i + di >= 0) & (i + di < nx))
-        yield mine, samples[mine] + dj * nx + di, (finest / pitch_um[0 if di else 1]) ** 2

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
-from pipeline.surface.conditioning import LEVELS, condition, fill_holes
+from pipeline.surface.conditioning import LEVELS, condition
+from pipeline.surface.fill import fill_holes
 from pipeline.surface.heightfield import HeightField
 
 PITCH = (0.05, 0.08)
