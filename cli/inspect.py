@@ -1,7 +1,7 @@
 """`inspect`: the content of a scan, a config or a bundle."""
 
 import json
-from dataclasses import asdict
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -79,12 +79,14 @@ def _config(path: Path) -> dict[str, Any]:
 def _scan(path: Path, channel: str | None) -> dict[str, Any]:
     import numpy as np
 
+    from pipeline.surface.holes import measured_part
     from pipeline.surface.readers import read_scan
 
     scan = read_scan(path, channel)
-    valid = scan.heights[np.isfinite(scan.heights)]
-    found = {k: v for k, v in asdict(scan).items() if k != "heights"}
+    found = {field.name: getattr(scan, field.name) for field in fields(scan) if field.name not in ("heights", "mask")}
     rows, columns = scan.heights.shape
+    measured = measured_part(scan)
+    valid = measured.heights[np.isfinite(measured.heights)]
     needs = {
         "surface.pitch_um": scan.pitch_um is None,
         "surface.height_range_um": scan.um_per_unit is None and scan.full_code is not None,
@@ -94,8 +96,12 @@ def _scan(path: Path, channel: str | None) -> dict[str, Any]:
         "file": path.name,
         **found,
         "samples": f"{columns} x {rows}",
-        "holes": int(scan.heights.size - valid.size),
+        "holes": round(measured.share * scan.heights.size),
+        "not measured": [str(entry) for entry in measured.unmeasured],
+        "cropped": dict(zip(("bottom", "top", "left", "right"), measured.cropped, strict=True)),
+        "mask covers": measured.masked_share,
         "lowest": float(valid.min()) if valid.size else None,
         "highest": float(valid.max()) if valid.size else None,
+        "warnings": list(measured.warnings),
         "config needs": [key for key, needed in needs.items() if needed],
     }

@@ -23,15 +23,19 @@ def load_scan(path: str | Path, **keys: Any) -> HeightField:
 
     path: a file of any format that docs/usage.md lists.
     keys: those of [surface], with its units and defaults: channel, pitch_um (um, one number or (x, y)), height_unit,
-        height_range_um (um), override_file_units, level, clip_percentile ((low, high), percent).
+        height_range_um (um), override_file_units, level, clip_percentile ((low, high), percent), mask, no_data,
+        max_hole_share.
 
     Returns the height field: heights_um, float64 (ny, nx), um, x growing with the column and y up with the row;
-    pitch_um, (x, y), um. Holes are filled; the surface is levelled, by a plane unless `level` says otherwise, and
+    pitch_um, (x, y), um. Rows and columns at the edges that were not measured are cropped, other holes are filled,
+    and a UserWarning tells their share; the surface is levelled, by a plane unless `level` says otherwise, and
     centred.
 
     Raises ConfigError for wrong keys; InputError where the file cannot be read or trusted, or lacks a unit (the
     message names the key to give).
     """
+    import warnings
+
     from pipeline.surface import load
     from pipeline.surface.conditioning import condition
 
@@ -40,7 +44,9 @@ def load_scan(path: str | Path, **keys: Any) -> HeightField:
         raise InputError(f"{path}: no such scan file; check the path")
     section = {"path": str(path), **keys}
     surface = read.parse({"name": "scan", "surface": section}, str(path), Path.cwd()).surface
-    field, _ = load.load_scan(surface)
+    field, record = load.load_scan(surface)
+    for warning in record.warnings:
+        warnings.warn(f"{record.file}: {warning}", stacklevel=2)
     return condition(field, surface.levelling, surface.clip_percentile)[0]
 
 

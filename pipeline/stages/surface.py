@@ -13,13 +13,15 @@ from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store import arrays, digest
 from pipeline.store.store import Artifact
 from pipeline.surface import recipes
-from pipeline.surface.conditioning import condition
+from pipeline.surface.conditioning import ConditioningRecord, condition
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.statistics import SurfaceStatistics, measure
 
 _FILE = "surface.zarr"
 # the smallest share of the visible frequencies within the Nyquist limits with which a bake makes sense
 _LEAST_KNOWN = 0.05
+# a scan is mounted flatter than this; cliffs between heights and other numbers are levelled as slopes
+_STEEP_DEG = 10.0
 # a larger relative difference of the pitches is not due to the rounding of square pixels
 _SQUARE = 0.01
 
@@ -64,8 +66,21 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
         "scan": scan,
         "conditioning": asdict(cleaning),
         "statistics": asdict(statistics),
-        "warnings": _warnings(statistics, config.coherence.sigma_um, lambda_min, is_scan=scan is not None),
+        "warnings": [
+            *([] if scan is None else scan["warnings"]),
+            *_slope_warnings(cleaning),
+            *_warnings(statistics, config.coherence.sigma_um, lambda_min, is_scan=scan is not None),
+        ],
     }
+
+
+def _slope_warnings(cleaning: ConditioningRecord) -> list[str]:
+    """Tells of a steep slope, which levelling removed."""
+    x, y = cleaning.slope_deg
+    if max(abs(x), abs(y)) <= _STEEP_DEG:
+        return []
+    remedy = "check units and pitch, and that all numbers are heights"
+    return [f"a slope of {x:.3g} x {y:.3g} degrees was levelled, steeper than any sample is mounted: {remedy}"]
 
 
 def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: float, *, is_scan: bool) -> list[str]:

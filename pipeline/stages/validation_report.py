@@ -48,14 +48,31 @@ def _surface_rows(summary: dict[str, Any]) -> Rows:
         ["rms step across the seams (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["seam_step_um"]))],
         ["heights' energy in the seams", f"{100 * s['seam_energy']:.2g} %"],
         ["rms step between samples (nm)", "{:.1f} × {:.1f}".format(*(1e3 * x for x in s["inner_step_um"]))],
+        *_measured_rows(summary["scan"]),
         *_cleaning_rows(summary["conditioning"]),
     ]
+
+
+def _measured_rows(scan: dict[str, Any] | None) -> Rows:
+    """The samples of a scan that were not measured, and the rows and columns that were cropped for it."""
+    if scan is None:
+        return []
+    found = "; ".join(f"{entry['found']} {100 * entry['share']:.2g} %" for entry in scan["unmeasured"])
+    cropped = ", ".join(
+        f"{n} at the {edge}" for n, edge in zip(scan["cropped"], ("bottom", "top", "left", "right"), strict=True) if n
+    )
+    rows = [["not measured", f"{100 * scan['unmeasured_share']:.2g} %" + (f" ({found})" if found else "")]]
+    if cropped:
+        rows.append(["rows and columns cropped", cropped])
+    if scan["masked_share"]:
+        rows.append(["covered by the file's mask", f"{100 * scan['masked_share']:.2g} %"])
+    return rows
 
 
 def _cleaning_rows(done: dict[str, Any]) -> Rows:
     """Lists the steps of conditioning, and the number of samples that each changed."""
     rows = [
-        ["holes filled", f"{done['holes']} samples"],
+        ["holes filled", f"{done['holes']} samples, {100 * done['hole_share']:.2g} %"],
         ["levelled by", f"{done['level']} (rms removed {1e3 * done['removed_rms_um']:.2f} nm)"],
     ]
     if done["clip_percentile"] is not None:

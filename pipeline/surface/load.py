@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.holes import Measured, Unmeasured, far_apart, measured_part
 from pipeline.surface.readers import read_scan
-from pipeline.surface.readers.common import check_shape, fault, micrometres
+from pipeline.surface.readers.common import MIN_SAMPLES, check_shape, fault, micrometres
 from pipeline.surface.scan import Scan
 from pipeline.surface.source import SurfaceSource
 from pipeline.validated import as_pair
@@ -30,8 +31,13 @@ class ScanRecord:
 
     file: its name. format, reader: the format in words, and the library that read it. channel, channels: the channel
         read, and all that may hold heights.
-    shape: samples (ny, nx). pitch_um: sample distance along (x, y), um. um_per_unit: micrometres per stored unit or
-        image code. pitch_from, unit_from: the origin of these values. holes: number of samples without a height.
+    shape: samples (ny, nx), after cropping. pitch_um: sample distance along (x, y), um. um_per_unit: micrometres per
+        stored unit or image code. pitch_from, unit_from: the origin of these values.
+    unmeasured: what was found of samples without a measured height, and unmeasured_share: their share of the file's.
+    cropped: rows or columns without any measured height, removed at the (bottom, top, left, right).
+    holes: number of samples of `shape` without a height, which are filled. masked_share: share of the samples that a
+        mask of the file covers.
+    warnings: sentences for the user about all this.
     """
 
     file: str
@@ -44,7 +50,12 @@ class ScanRecord:
     pitch_from: Origin
     um_per_unit: float
     unit_from: Origin
+    unmeasured: tuple[Unmeasured, ...]
+    unmeasured_share: float
+    cropped: tuple[int, int, int, int]
     holes: int
+    masked_share: float
+    warnings: tuple[str, ...]
 
 
 def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
@@ -59,12 +70,15 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
         raise ValueError("load_scan reads files; this surface is a recipe")
     path = Path(surface.path)
     scan = read_scan(path, surface.channel)
-    holes = _check_values(path.name, scan.heights)
+    _check_values(path.name, scan.heights)
+    measured = measured_part(scan, surface.mask, surface.no_data)
+    _check_holes(path.name, measured, surface.max_hole_share)
     unit, pitch = _units(path.name, scan, surface)
-    heights = scan.heights * unit[0]
+    heights = measured.heights * unit[0]
     _check_pitch(path.name, pitch[0])
     _check_range(path.name, heights, unit, scan.full_code is not None)
     field = HeightField(heights, pitch[0])
+    populations = far_apart(heights)
     record = ScanRecord(
         file=path.name,
         format=scan.format,
@@ -76,7 +90,12 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
         pitch_from=pitch[1],
         um_per_unit=unit[0],
         unit_from=unit[1],
-        holes=holes,
+        unmeasured=measured.unmeasured,
+        unmeasured_share=measured.share,
+        cropped=measured.cropped,
+        holes=measured.holes,
+        masked_share=measured.masked_share,
+        warnings=measured.warnings if populations is None else (*measured.warnings, populations),
     )
     return field, record
 
@@ -84,19 +103,35 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
 # --- values ------------------------------------------------------------------------------------------
 
 
-def _check_values(file: str, heights: NDArray[np.float64]) -> int:
-    """Counts the holes. Raises InputError for a shape or for values that no height map has."""
+def _check_values(file: str, heights: NDArray[np.float64]) -> None:
+    """Raises InputError for a shape or for values that no height map has."""
     check_shape(file, heights.shape)
     infinite = int(np.count_nonzero(np.isinf(heights)))
     if infinite:
         raise fault(file, "finite heights", f"{infinite} infinite values", "write holes as NaN, correct the others")
-    holes = int(np.count_nonzero(np.isnan(heights)))
-    if holes == heights.size:
+    if np.isnan(heights).all():
         raise fault(file, "heights", "NaN everywhere", "export it again, or set surface.channel")
-    if 2 * holes > heights.size:
-        found = f"{holes} holes (NaN) in {heights.size} samples"
-        raise fault(file, "holes in no more than half of the scan", found, "crop to the measured part")
-    return holes
+
+
+def _check_holes(file: str, measured: Measured, largest_share: float) -> None:
+    """Raises InputError where too little of a scan was measured."""
+    what = "; ".join(str(entry) for entry in measured.unmeasured)
+    ny, nx = measured.heights.shape
+    if measured.share == 1.0 or min(ny, nx) < MIN_SAMPLES:
+        found = "none" if measured.share == 1.0 else f"{ny} x {nx} (rows x columns)"
+        raise fault(
+            file,
+            f"at least {MIN_SAMPLES} measured samples along each axis",
+            f"{found}, for {100 * measured.share:.3g} % was not measured ({what})",
+            "take a whole scan, or name the numbers that mean no data in surface.no_data",
+        )
+    if measured.holes > largest_share * ny * nx:
+        raise fault(
+            file,
+            f"holes in no more than {100 * largest_share:g} % of the scan",
+            f"{measured.holes} holes in {ny * nx} samples ({what})",
+            "crop to the measured part, or raise surface.max_hole_share: what is filled scatters no light",
+        )
 
 
 def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:

@@ -16,6 +16,7 @@ class Scan:
     full_code: the largest code that an image can store (255, 65535); None for other formats.
     channel: the name of this channel. channels: the names of all channels that may hold heights.
     format: the format in words. reader: the library that read it, with its version.
+    mask: bool (ny, nx), true where a mask of the file covers the channel; None where it has none.
     """
 
     heights: NDArray[np.float64]
@@ -26,3 +27,4 @@ class Scan:
     channels: tuple[str, ...]
     format: str
     reader: str
+    mask: NDArray[np.bool_] | None = None

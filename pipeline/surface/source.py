@@ -1,11 +1,11 @@
 """The source of the heights, a scan file or a recipe, and the conditioning of a scan."""
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pipeline.surface.recipes.parameters import Recipe
-from pipeline.validated import Pair, Positive, PositivePair, Validated, existing_file
+from pipeline.validated import Finite, Pair, Positive, PositivePair, Validated, existing_file
 
 Unit = Literal["pm", "nm", "um", "mm", "m"]
 
@@ -19,6 +19,10 @@ class SurfaceSource(Validated):
     override_file_units: whether these three keys win over units that the file states.
     level: the background that is subtracted; by default a plane from scans and nothing from recipes.
     clip_percentile: (low, high) percentiles, %, to which heights are limited.
+    mask: whether samples under a mask in the file become holes ("holes"), all others do ("keep"), or it counts for
+        nothing ("ignore"; by default likewise, with a warning).
+    no_data: stored numbers that mean no data; by default these, and rows that were not scanned, are recognised.
+    max_hole_share: the largest share of holes that are filled; a scan with more is refused.
     recipe: kind and parameters of a synthetic surface.
     """
 
@@ -30,6 +34,10 @@ class SurfaceSource(Validated):
     override_file_units: bool = False
     level: Literal["none", "plane", "quadratic", "rows"] | None = None
     clip_percentile: Pair | None = None
+    mask: Literal["holes", "ignore", "keep"] | None = None
+    no_data: Annotated[tuple[Finite, ...], Field(strict=False)] | None = None
+    # what is filled scatters nothing: at 0.3, half of the diffracted power is left, (1 - 0.3)^2
+    max_hole_share: Annotated[float, Field(ge=0, lt=1)] = 0.3
     recipe: Recipe | None = None
 
     @model_validator(mode="after")
@@ -39,8 +47,10 @@ class SurfaceSource(Validated):
             found = "neither" if self.path is None else "both"
             raise ValueError(f"expected either 'path' (a scan) or 'recipe' (a synthetic surface), got {found}")
         if self.recipe is not None:
-            reading = ("channel", "pitch_um", "height_unit", "height_range_um", "clip_percentile")
+            reading = ("channel", "pitch_um", "height_unit", "height_range_um", "clip_percentile", "mask", "no_data")
             set_keys = [key for key in reading if getattr(self, key) is not None]
+            if self.max_hole_share != type(self).model_fields["max_hole_share"].default:
+                set_keys.append("max_hole_share")
             if set_keys:
                 raise ValueError(f"{', '.join(set_keys)}: only for a scan file, got a recipe; remove these keys")
         return self

@@ -77,7 +77,7 @@ def test_empty_file(tool: Tool, name: str) -> None:
         (HILLS[:, :1], "at least 8 samples along each axis"),
         (HILLS[0], "a 2-D height map"),
         (np.full((64, 64), np.nan), "NaN everywhere"),
-        (np.where(RNG.random(HILLS.shape) < 0.6, np.nan, HILLS), "more than half"),
+        (np.where(RNG.random(HILLS.shape) < 0.6, np.nan, HILLS), "no more than 30 %"),
         (with_one(np.inf), "1 infinite values"),
         (with_one(-np.inf), "1 infinite values"),
         (HILLS.astype(complex), "real numbers"),

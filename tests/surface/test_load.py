@@ -138,11 +138,26 @@ def test_keys_of_the_wrong_kind_of_file(npy: Path, png: Path) -> None:
 
 def test_holes_are_kept_and_counted(tmp_path: Path) -> None:
     heights = RAMP.copy()
-    heights[:5, :] = np.nan
+    heights[2:8, 3:9] = np.nan
     field, record = load(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
-    assert record.holes == np.isnan(field.heights_um).sum() == 60
-    heights[5, 0] = np.nan
-    assert "61 holes" in message_of(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
+    assert record.holes == np.isnan(field.heights_um).sum() == 36
+    heights[9, 0] = np.nan
+    path = save(tmp_path, heights)
+    assert "37 holes" in message_of(path, pitch_um=0.1, height_unit="nm")
+    assert "raise surface.max_hole_share" in message_of(path, pitch_um=0.1, height_unit="nm")
+    assert load(path, pitch_um=0.1, height_unit="nm", max_hole_share=0.31)[1].holes == 37
+    assert "no more than 10 %" in message_of(path, pitch_um=0.1, height_unit="nm", max_hole_share=0.1)
+
+
+def test_rows_that_were_not_scanned_are_cropped(tmp_path: Path) -> None:
+    heights = np.vstack([RAMP, RAMP + 120])
+    heights[:9] = np.nan
+    field, record = load(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
+    np.testing.assert_array_equal(field.heights_um, heights[9:] * 1e-3)
+    assert (record.shape, record.cropped, record.holes) == ((11, 12), (9, 0, 0, 0), 0)
+    assert record.unmeasured_share == 0.45
+    heights[:13] = np.nan
+    assert "7 x 12 (rows x columns)" in message_of(save(tmp_path, heights), pitch_um=0.1, height_unit="nm")
 
 
 def test_infinite_is_no_hole(tmp_path: Path) -> None:

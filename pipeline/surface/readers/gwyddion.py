@@ -24,17 +24,18 @@ _DATA_KEY = re.compile(r"/(\d+)/data")
 
 @dataclass(frozen=True)
 class _Field:
-    """One data field: its name, gwyfile's object, and micrometres per unit of its values."""
+    """One data field: its name, gwyfile's object and its mask's, and micrometres per unit of its values."""
 
     name: str
     data: Any
     um_per_unit: float | None
+    mask: Any
 
 
 def read(path: Path, channel: str | None) -> Scan:
     """Reads one data field and flips it, because Gwyddion stores the top row first.
 
-    Empty units become None. Masks make no holes: they mark grains as often as bad data.
+    Empty units become None. The mask is returned beside the heights: it marks grains as often as bad data.
     """
     with third_party(path.name, "a Gwyddion .gwy file", "gwyfile"):
         import gwyfile
@@ -44,6 +45,7 @@ def read(path: Path, channel: str | None) -> Scan:
         index = pick_channel(path.name, names, channel)
         heights = _heights(path, fields[index].data)
         pitch = _pitch(path, fields[index].data)
+        mask = _mask(heights, fields[index].mask)
     return Scan(
         heights,
         fields[index].um_per_unit,
@@ -53,6 +55,7 @@ def read(path: Path, channel: str | None) -> Scan:
         tuple(names),
         "Gwyddion .gwy",
         library_version("gwyfile"),
+        mask,
     )
 
 
@@ -65,7 +68,7 @@ def _height_fields(container: Any) -> list[_Field]:
         unit = _unit(data, "si_unit_z")
         if unit == "" or micrometres(unit) is not None:
             name = str(container.get(f"/{number}/data/title") or f"channel {number}")
-            fields.append(_Field(name, data, micrometres(unit)))
+            fields.append(_Field(name, data, micrometres(unit), container.get(f"/{number}/mask")))
     return fields
 
 
@@ -77,6 +80,11 @@ def _unit(data: Any, key: str) -> str:
 def _heights(path: Path, data: Any) -> NDArray[np.float64]:
     check_shape(path.name, (int(data["yres"]), int(data["xres"])))
     return np.array(data.data[::-1], dtype=np.float64, order="C")
+
+
+def _mask(heights: NDArray[np.float64], mask: Any) -> NDArray[np.bool_] | None:
+    covered = None if mask is None else np.ascontiguousarray(mask.data[::-1] > 0.5)
+    return covered if covered is not None and covered.shape == heights.shape else None
 
 
 def _pitch(path: Path, data: Any) -> tuple[float, float] | None:
