@@ -30,6 +30,7 @@ from pipeline.tables.evaluate import Evaluator
 from pipeline.tables.planning import plan
 from pipeline.tables.polar import spectral
 
+CERTIFIES = "the table of the heights that were baked, not that these heights are those of the surface"
 _SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
 
@@ -39,7 +40,7 @@ class Certificate:
 
     delta_e: allowed mean CIELAB error; None where no budget is set. exposure_ru: exposure of both errors, RU.
     measured: mean CIELAB error at `exposure_ru`. random: the table against the reference on random directions.
-    reference: the reference against sums over samples.
+    reference: the reference against sums over samples. certifies: what these errors are of, in words.
     """
 
     delta_e: float | None
@@ -47,6 +48,7 @@ class Certificate:
     measured: float
     random: RandomCheck
     reference: RelativeError
+    certifies: str = CERTIFIES
 
 
 def measure(

@@ -102,6 +102,7 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         settings=layout.settings(inputs.summary(layout.transform.name), table),
         error_columns=ERROR_COLUMNS,
         errors=error_rows(results),
+        certifies=table["certificate"]["certifies"],
         relative_errors=_relative_error_rows(results),
         pictures=pictures,
         studied=layout.study_remark,

@@ -1,6 +1,8 @@
 """The strongest periods of a height field: the lobes of its power spectrum, found by mean shift."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from math import atan2, degrees, log, pi
 
 import numpy as np
@@ -19,6 +21,10 @@ _KERNEL, _KERNEL_BINS = 1 / 6, 1.0
 _RADIUS, _RADIUS_BINS = 1 / 6, 3.0
 # least power per bin, relative to the mean on the ring of the same |f|; isotropic noise remains below
 _LEAST_CONTRAST = 5.0
+# a single line with a tenth of the variance is reported even beside lobes of the same |f|, such as a disc's pits: its
+# peak exceeds the rest of the ring by _LINE_CONTRAST, and noise of the same frequency, which interferes, leaves this
+# share within _LINE_BINS of it
+_LINE_SHARE, _LINE_CONTRAST, _LINE_BINS = 0.07, 8.0, 2.0
 # least share of the variance
 _LEAST_SHARE = 0.005
 
@@ -57,12 +63,13 @@ def dominant_periods(field: HeightField, highest_per_um: float, count: int = 4) 
     A lobe is a mode of the spectrum smoothed over a sixth of its frequency, so that the speckles into which disorder
     splits a line count as one lobe. Its centre is a fixed point of mean shift, which locates a single line to a small
     fraction of a bin. Lobes with fewer than four repeats across the patch, with less than 0.5 % of the variance, or
-    hardly brighter than other azimuths of the same |f| are omitted.
+    hardly brighter than other azimuths of the same |f| are omitted, but no single line with a tenth of the variance.
 
     field: without holes. highest_per_um: the highest frequency of interest, 1/um. count: the most periods to return.
     Returns the periods by falling share of the variance.
     """
-    spectrum = _spectrum(field, highest_per_um)
+    spectrum = _spectrum(field, highest_per_um, _gaussian)
+    finest = cache(lambda: _spectrum(field, highest_per_um, _hann))
     if spectrum.variance == 0:
         return ()
     middles: list[complex] = []
@@ -72,6 +79,10 @@ def dominant_periods(field: HeightField, highest_per_um: float, count: int = 4) 
         if _repeats(spectrum, middle) < 0.95 * _FEWEST_REPEATS or _is_known(spectrum, middle, middles):
             continue
         share = _share(spectrum, middle)
+        if share == 0:
+            middle, share = _strong_line(finest(), middle)
+            if _is_known(spectrum, middle, middles):
+                continue
         if share >= _LEAST_SHARE:
             middles.append(middle)
             found.append(_period(middle, share))
@@ -110,13 +121,10 @@ def _period(frequency: complex, share: float) -> Period:
     return Period(1 / abs(frequency), direction, share)
 
 
-def _spectrum(field: HeightField, highest_per_um: float) -> _HeightSpectrum:
-    """Computes the power spectrum of a field for |fx|, |fy| <= `highest_per_um`, under a Gaussian window.
-
-    The window's sigma is an eighth of the patch. It has no side lobes that could be mistaken for lines.
-    """
+def _spectrum(field: HeightField, highest_per_um: float, window_of: Callable[[int], Array]) -> _HeightSpectrum:
+    """Computes the power spectrum of a field for |fx|, |fy| <= `highest_per_um`, under a window along both axes."""
     ny, nx = field.shape
-    window = _window(ny)[:, None] * _window(nx)
+    window = window_of(ny)[:, None] * window_of(nx)
     seen = (field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))) * window
     weight = float(np.sum(window**2))
     # by Parseval's theorem, the sum over all frequencies; the rounding errors of a flat field count as 0
@@ -139,8 +147,17 @@ def _ascending(samples: int, pitch_um: float, highest_per_um: float) -> tuple[np
     return place[kept], frequency[kept]
 
 
-def _window(samples: int) -> Array:
-    """Returns a centred Gaussian window (samples,) whose standard deviation is an eighth of its length."""
+def _hann(samples: int) -> Array:
+    """Returns a centred Hann window (samples,), under which lines are half as wide as under the Gaussian."""
+    window: Array = np.cos(np.pi * (np.arange(samples) - 0.5 * (samples - 1)) / (samples + 1)) ** 2
+    return window
+
+
+def _gaussian(samples: int) -> Array:
+    """Returns a centred Gaussian window (samples,) whose standard deviation is an eighth of its length.
+
+    It has no side lobes that could be mistaken for lines.
+    """
     window: Array = np.exp(-0.5 * ((np.arange(samples) - 0.5 * (samples - 1)) / (samples / 8)) ** 2)
     return window
 
@@ -241,8 +258,7 @@ def _share(spectrum: _HeightSpectrum, middle: complex) -> float:
     """Computes the share of the variance in the lobes at +-f; 0 for a lobe without contrast to other azimuths."""
     rx, ry = _extent(spectrum, middle, _RADIUS, _RADIUS_BINS)
     frequencies, power = _near(spectrum, middle, rx, ry)
-    gap = frequencies - middle
-    inside = (gap.real / rx) ** 2 + (gap.imag / ry) ** 2 <= 1
+    inside = _inside(frequencies - middle, rx, ry)
     lobe = float(np.sum(power[inside]))
     distance = np.hypot(spectrum.fx, spectrum.fy[:, None])
     ring = spectrum.power[np.abs(distance - abs(middle)) <= min(rx, ry)]
@@ -250,3 +266,32 @@ def _share(spectrum: _HeightSpectrum, middle: complex) -> float:
     noise = float(np.median(ring)) / log(2)
     is_lobe = lobe > _LEAST_CONTRAST * noise * np.count_nonzero(inside)
     return 2 * lobe / spectrum.variance if is_lobe else 0.0
+
+
+def _strong_line(spectrum: _HeightSpectrum, start: complex) -> tuple[complex, float]:
+    """Finds the strongest line near `start`, in a spectrum under a Hann window.
+
+    Returns its frequency and its share of the variance; 0 unless this is about a tenth, and the line exceeds all else
+    at the same |f|.
+    """
+    frequencies, power = _near(spectrum, start, *_extent(spectrum, start, 0.0, _RADIUS_BINS))
+    one_bin = _extent(spectrum, start, 0.0, 1.0)
+    line = _mean_shift(spectrum, complex(frequencies[np.argmax(power)]), one_bin, reach=_LINE_BINS)
+    reach_x, reach_y = _extent(spectrum, line, 0.0, _LINE_BINS)
+    frequencies, power = _near(spectrum, line, reach_x, reach_y)
+    core = power[_inside(frequencies - line, reach_x, reach_y)]
+    share = 2 * float(np.sum(core)) / spectrum.variance
+    if share < _LINE_SHARE or _repeats(spectrum, line) < 0.95 * _FEWEST_REPEATS:
+        return line, 0.0
+    all_frequencies = spectrum.fx + 1j * spectrum.fy[:, None]
+    ring = np.abs(np.abs(all_frequencies) - abs(line)) <= min(reach_x, reach_y)
+    for lobe in (line, -line):
+        ring &= ~_inside(all_frequencies - lobe, 1.5 * reach_x, 1.5 * reach_y)
+    noise = float(np.median(spectrum.power[ring])) / log(2) if ring.any() else 0.0
+    return line, share if float(np.max(core)) > _LINE_CONTRAST * noise else 0.0
+
+
+def _inside(gaps: NDArray[np.complex128], rx: float, ry: float) -> NDArray[np.bool_]:
+    """Whether frequencies relative to a middle lie within the ellipse of radii rx, ry, 1/um."""
+    within: NDArray[np.bool_] = (gaps.real / rx) ** 2 + (gaps.imag / ry) ** 2 <= 1
+    return within

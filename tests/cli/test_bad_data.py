@@ -180,6 +180,42 @@ def test_a_hopeless_pitch_is_refused(tool: Tool) -> None:
     refused(tool, result, "too coarse: 9", "0.135 um or finer")
 
 
+@pytest.mark.slow
+def test_what_was_not_measured_is_told_everywhere(tool: Tool) -> None:
+    heights = HILLS.copy()
+    heights[90:] = 0.0
+    heights[40:50, 40:52] = np.nan
+    result = bake(tool, npy(tool, heights), **UNITS)
+    assert result.code == 0, result.stderr
+    (line,) = (line for line in result.stderr.splitlines() if "not measured" in line)
+    assert line.startswith("warning: small: 11 % of the scan was not measured")
+    assert "10 rows at the top cropped, 1.3 % of the rest filled" in line
+    warning = line.removeprefix("warning: small: ")
+    report = (tool.out / "small" / "report.html").read_text(encoding="utf-8")
+    assert warning in report
+    assert "10 at the top" in report
+    assert "not that these heights are those of the surface" in report
+    (bundle,) = tool.out.glob("small/small-*")
+    manifest = json.loads((bundle / "manifest.json").read_text(encoding="utf-8"))
+    assert warning in manifest["surface"]["warnings"]
+    assert manifest["surface"]["scan"]["cropped"] == [0, 10, 0, 0]
+    assert manifest["surface"]["scan"]["unmeasured_share"] == 0.112
+    assert "not that these heights" in manifest["certificate"]["certifies"]
+    readme = (bundle / "README.md").read_text(encoding="utf-8")
+    assert f"Warning: {warning}" in readme
+    assert "This certifies the table of the heights that were baked" in readme
+
+
+def test_a_steep_slope_and_two_groups_of_heights_are_told(tool: Tool) -> None:
+    steep = HILLS + 0.03 * np.arange(100)
+    cliff = HILLS - 4.0 * (np.arange(100) > 79)[:, None] * (1 + 1e-3 * np.arange(100))
+    for heights, message in ((steep, "a slope of 16.6 x"), (cliff, "heights lie in two groups 3.9")):
+        config = tool.config(surface={"path": str(npy(tool, heights)), **UNITS})
+        result = tool("run", config, "--until", "surface")
+        assert result.code == 0, result.stderr
+        assert any(message in line for line in result.stderr.splitlines() if line.startswith("warning: "))
+
+
 def test_holes_and_dust_are_corrected_and_counted(tool: Tool) -> None:
     heights = HILLS.copy()
     heights[40:44, 50:53] = np.nan

@@ -60,6 +60,26 @@ def test_holes_of_a_scan_without_a_height(tool: Tool) -> None:
     assert (found["samples"], found["holes"], found["lowest"]) == ("10 x 9", 90, None)
 
 
+def test_what_was_not_measured(tool: Tool) -> None:
+    rng = np.random.default_rng(0)
+    heights = rng.standard_normal((40, 50))
+    heights[30:] = 0.0
+    heights[5, 6:9] = -9999
+    np.save(tool.folder / "scan.npy", heights)
+    found = tool("inspect", "scan.npy", "--json").json
+    assert (found["samples"], found["holes"]) == ("50 x 40", 503)
+    assert found["cropped"] == {"bottom": 0, "top": 10, "left": 0, "right": 0}
+    assert found["not measured"] == [
+        "no-data number (-9999): 3 samples, 0.15 %",
+        "rows of one value (0): 500 samples, 25 %",
+    ]
+    assert found["lowest"] > -6
+    (warning,) = found["warnings"]
+    assert warning.startswith("25 % of the scan was not measured")
+    assert "10 rows at the top cropped" in warning
+    assert found["mask covers"] == 0.0
+
+
 def test_a_config_with_its_defaults(baked: Tool) -> None:
     found = baked("inspect", "small.toml", "--json").json
     assert found["table"] == {

@@ -23,6 +23,7 @@ from pipeline.surface.recipes.parameters import (
     Xenopeltis,
 )
 from pipeline.surface.statistics import SurfaceStatistics, covered_share, measure
+from tests.support import shared_file
 
 SCANS = Path(__file__).parents[2].parent / "shared" / "data" / "snakes"
 
@@ -137,6 +138,44 @@ def test_a_blaze_reports_its_harmonics() -> None:
     # of M samples a period: |c_m|^2 = 1 / (2 M sin(pi m / M))^2, of the variance (1 - 1 / M^2) / 12
     shares = [2 / (50 * np.sin(np.pi * m / 25)) ** 2 * 12 / (1 - 1 / 625) for m in (1, 2)]
     assert (first.share, second.share) == pytest.approx(shares, rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [10.0, 13.0])
+def test_the_tracks_of_a_small_scan_are_reported(size: float) -> None:
+    strongest = statistics(make(CompactDisc(kind="cd", size_um=size, pitch_um=0.08))).periods[0]
+    assert strongest.period_um == pytest.approx(1.6, rel=0.01)
+    assert strongest.share > 0.3
+
+
+def test_a_line_with_pits_of_its_own_frequency() -> None:
+    stored = np.load(shared_file("field/cd_like.npz"))
+    heights = stored[stored.files[0]].astype(np.float64)
+    raw = HeightField(1e-3 * heights, (0.078125, 0.078125))
+    strongest = statistics(condition(raw, "plane", None)[0]).periods[0]
+    assert strongest.period_um == pytest.approx(1.6, rel=0.01)
+    assert 0.3 < strongest.share < 0.5
+
+
+# where the noise holds as much at the same |f|, a line is one of its waves: weak lines have more repeats here
+@pytest.mark.parametrize(
+    ("share", "repeats", "correlation"),
+    [
+        *((share, repeats, 0.5) for share in (0.1, 0.2, 0.4) for repeats in (9.0, 25.0)),
+        *((share, repeats, 1.0) for share in (0.2, 0.4) for repeats in (9.0, 25.0)),
+        *((0.4, 6.5, correlation) for correlation in (0.5, 1.0)),
+        (0.1, 25.0, 1.0),
+    ],
+)
+def test_a_line_that_holds_a_tenth_of_the_variance_is_reported(
+    share: float, repeats: float, correlation: float
+) -> None:
+    size = 24.0
+    noise = make(GaussianRandom(kind="gaussian", size_um=size, correlation_um=correlation, seed=5)).heights_um
+    ny, nx = noise.shape
+    wave = np.sin(2 * np.pi * repeats * (0.8 * np.arange(nx) / nx + 0.6 * np.arange(ny)[:, None] / ny))
+    line = wave * np.sqrt(share / (1 - share)) * noise.std() / wave.std()
+    found = statistics(HeightField(noise + line, (size / nx, size / ny))).periods
+    assert any(period.period_um == pytest.approx(size / repeats, rel=0.05) for period in found)
 
 
 def test_a_disc_reports_its_tracks() -> None:
