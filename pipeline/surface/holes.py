@@ -37,7 +37,11 @@ _PLATEAU_SHARE, _PLATEAU, _NEAREST, _ROUNDING = 0.01, 10, 5, 1e-6
 # a row of one value is not measured where neighbours in other rows differ in more than this share, and where at most
 # this share of their samples, or so many times a typical value's share, holds the value
 _ROUGH, _RARE, _TYPICAL = 0.2, 0.02, 4.0
+# the share where such rows hold different values, as flat parts of a tilted, smooth surface do
+_VERY_ROUGH = 0.8
 _LEAST_ROWS = 8
+# bends of a straight row, in those of typical samples: what is left is rounding
+_STRAIGHT = 1e-3
 # a value this close to the end of the others' range, in shares of it, is where they are clipped, and rows of it are
 # not measured only in one block at an edge
 _CLIPPED = 0.02
@@ -51,8 +55,8 @@ _POPULATION, _CLIFF_UM, _CLIFF = 0.005, 2.0, 5.0
 class Unmeasured:
     """Samples without a measured height, found in one way.
 
-    found: "NaN", "mask", "no-data number", "one value among heights", "rows of one value" or "repeated rows" (or
-        columns). stated: whether the
+    found: "NaN", "mask", "no-data number", "one value among heights", "rows of one value", "straight rows" or
+        "repeated rows" (or columns). stated: whether the
     file or the config states it. samples: their number. share: of all samples of the file. value: the number that
     they hold, in the file's unit; None for several, and for NaN.
     """
@@ -123,6 +127,8 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
             new, values = _constant_lines(np.moveaxis(heights, axis, 0), np.moveaxis(hole, axis, 0))
             level = values[0] if len(values) == 1 else None
             add(f"{lines} of one value", False, np.moveaxis(new, 0, axis), level)
+            new = _straight_lines(np.moveaxis(heights, axis, 0))
+            add(f"straight {lines}", False, np.moveaxis(new, 0, axis))
             new = _repeated_lines(np.moveaxis(heights, axis, 0), np.moveaxis(hole, axis, 0))
             add(f"repeated {lines}", False, np.moveaxis(new, 0, axis))
         plateau = _plateau(heights[~hole])
@@ -256,15 +262,15 @@ def _constant_lines(heights: Array, hole: Mask) -> tuple[Mask, list[float]]:
     high = np.max(heights, axis=1, where=known, initial=-np.inf)
     constant = (low == high) & (np.count_nonzero(known, axis=1) >= max(2, hole.shape[1] // 2))
     rough = np.flatnonzero(low < high)
-    if not constant.any() or rough.size < _LEAST_ROWS or not _is_rough(heights[rough], known[rough]):
+    least = _ROUGH if constant.any() and np.ptp(low[constant]) == 0 else _VERY_ROUGH
+    if not constant.any() or rough.size < _LEAST_ROWS or not _is_rough(heights[rough], known[rough], least):
         return new, []
     others = np.sort(heights[rough][known[rough]])
-    values, counts = np.unique(_sample(others), return_counts=True)
-    typical = float(np.average(counts, weights=counts)) / counts.sum() if values.size else 0.0
+    counts = np.unique(_sample(others), return_counts=True)[1]
+    # continuous values are held once each
+    typical = float(np.median(counts)) / counts.sum() if np.median(counts) > 1 else 0.0
     levels = np.unique(low[constant])
     held = np.searchsorted(others, levels, "right") - np.searchsorted(others, levels, "left")
-    # counts of a sample of continuous values are 1 each
-    typical = typical if typical * counts.sum() > 1.5 else 0.0
     rare = held <= others.size * max(_RARE, _TYPICAL * typical)
     apart = _CLIPPED * float(others[-1] - others[0])
     clipped = (levels >= others[0] - apart) & (levels <= others[0]) | (levels <= others[-1] + apart) & (
@@ -285,18 +291,19 @@ def _constant_lines(heights: Array, hole: Mask) -> tuple[Mask, list[float]]:
 
 
 def _is_edge_block(rows: Mask) -> bool:
-    """Whether the rows are one block of at least four that begins at an edge."""
-    places = np.flatnonzero(rows)
-    whole = places.size == places[-1] - places[0] + 1
-    return bool(whole and places.size >= _LEAST_COUNT and (rows[0] or rows[-1]))
+    """Whether the rows are blocks at one or both edges, of at least four rows each."""
+    others = np.flatnonzero(~rows)
+    before, after = int(others[0]), rows.size - 1 - int(others[-1])
+    whole = others.size == others[-1] - others[0] + 1
+    return bool(whole and max(before, after) > 0 and not 0 < before < _LEAST_COUNT and not 0 < after < _LEAST_COUNT)
 
 
-def _is_rough(rows: Array, known: Mask) -> bool:
+def _is_rough(rows: Array, known: Mask, least: float) -> bool:
     """Whether neighbours in most rows differ so often that no row has one value by chance."""
     pairs = known[:, 1:] & known[:, :-1]
     changes = np.count_nonzero((rows[:, 1:] != rows[:, :-1]) & pairs, axis=1)
     share = float(np.median(changes / np.maximum(np.count_nonzero(pairs, axis=1), 1)))
-    return share > _ROUGH and (1 - share) ** (rows.shape[1] - 1) < 1e-4
+    return share > least and (1 - share) ** (rows.shape[1] - 1) < 1e-4
 
 
 def _run_at_an_end(held: Mask) -> Mask:
@@ -307,6 +314,35 @@ def _run_at_an_end(held: Mask) -> Mask:
         run[:first] = first >= last
         run[held.size - last :] |= last > first
     return run
+
+
+def _straight_lines(heights: Array) -> Mask:
+    """Finds blocks of straight, sloping rows at an edge: rows of one value from which a plane was subtracted."""
+    new = np.zeros(heights.shape, bool)
+    rows = np.flatnonzero(~np.isnan(heights).all(axis=1))
+    if rows.size < 2 * _LEAST_ROWS:
+        return new
+    some = rows[:: rows.size // 64 + 1]
+    bend = float(np.nanmedian(_bends(heights[some])))
+    if not bend > 0:
+        return new
+    for inwards in (rows, rows[::-1]):
+        if not np.nanmax(_bends(heights[inwards[:_LEAST_COUNT]])) <= _STRAIGHT * bend:
+            continue
+        bends = _bends(heights[inwards])
+        straight = np.nanmax(bends, axis=1, initial=0.0) <= _STRAIGHT * bend
+        others = np.flatnonzero(~straight)
+        count = int(others[0])
+        rough = bends[others]
+        if others.size >= _LEAST_ROWS and np.count_nonzero(rough <= _STRAIGHT * bend) <= _RARE * rough.size:
+            new[inwards[:count]] = True
+    return new
+
+
+def _bends(rows: Array) -> Array:
+    """Computes the magnitudes of second differences along rows, NaN beside holes."""
+    bends: Array = np.abs(np.diff(rows, 2, axis=1))
+    return bends
 
 
 def _repeated_lines(heights: Array, hole: Mask) -> Mask:

@@ -34,7 +34,7 @@ def skin(seed: int = 0, shape: tuple[int, int] = (NY, NX)) -> Heights:
 
 
 def scan(heights: Any, full_code: float | None = None, mask: Any = None) -> Scan:
-    return Scan(np.asarray(heights, np.float64), None, None, full_code, "z", ("z",), "array", "numpy", mask)
+    return Scan(np.asarray(heights, np.float64), None, None, full_code, "z", ("z",), "array", "numpy", mask=mask)
 
 
 def found(measured: Measured) -> list[str]:
@@ -133,6 +133,17 @@ def test_rows_that_were_never_scanned_are_cropped(share: float, level: float, ed
     assert f"{missing} {'rows' if edge in ('bottom', 'top') else 'columns'} at the {edge} cropped" in warning
 
 
+@pytest.mark.parametrize("edge", ["bottom", "top"])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_unscanned_rows_from_which_a_plane_was_subtracted(edge: str, dtype: Any) -> None:
+    heights = skin() + 500
+    heights[slice(None, 30) if edge == "bottom" else slice(NY - 30, None)] = 0
+    heights -= 3 * np.arange(NX) - 7 * np.arange(NY)[:, None]
+    measured = measured_part(scan(heights.astype(dtype)))
+    assert (found(measured), measured.holes) == (["straight rows"], 0)
+    assert measured.cropped == ((30, 0, 0, 0) if edge == "bottom" else (0, 30, 0, 0))
+
+
 @pytest.mark.parametrize("level", [0.0, 3000.0])
 def test_the_line_in_which_a_scan_was_stopped(level: float) -> None:
     heights = skin() + 3000 * (level == 0)
@@ -162,6 +173,20 @@ def test_a_lost_line_within_the_scan_is_filled() -> None:
     heights[30] = 0.0
     measured = measured_part(scan(heights))
     assert (found(measured), measured.holes, measured.cropped) == (["rows of one value"], NX, (0, 0, 0, 0))
+
+
+def test_unscanned_rows_of_different_values() -> None:
+    heights = skin()
+    heights[50:] = np.arange(NY - 50)[:, None] * 3.7
+    assert measured_part(scan(heights)).cropped == (0, NY - 50, 0, 0)
+
+
+def test_zeros_of_a_scan_whose_lowest_height_is_zero() -> None:
+    heights = skin()
+    heights -= heights.min()
+    heights[:9] = heights[60:] = 0
+    measured = measured_part(scan(heights))
+    assert (measured.cropped, measured.holes) == ((9, NY - 60, 0, 0), 0)
 
 
 def test_quantised_heights_lose_their_unscanned_rows_only() -> None:
@@ -255,6 +280,17 @@ HONEST: dict[str, Callable[[], Heights]] = {
         127 + 6 * gaussian_filter(np.random.default_rng(0).standard_normal((NY, NX)), 5)
     ),
     "mirror with dust": lambda: np.where(np.random.default_rng(0).random((NY, NX)) < 0.01, 9.0, 0.0),
+    "tilted mirror": lambda: 0.3 * np.arange(NX) + 0.1 * np.arange(NY)[:, None],
+    "tilted mirror with dust": lambda: 0.3 * np.arange(NX) + (np.random.default_rng(0).random((NY, NX)) < 0.01),
+    "tilted mirror with one bump": lambda: (
+        np.maximum(0, 100 - np.hypot(*np.mgrid[-36:36, -30:30]) ** 2) + 0.3 * np.arange(NX)
+    ),
+    "tilted hills": lambda: (
+        0.1 * np.arange(NX) + np.maximum(0, gaussian_filter(np.random.default_rng(0).standard_normal((NY, NX)), 3))
+    ),
+    "parabola": lambda: np.arange(NX) ** 2.0 + np.arange(NY)[:, None] ** 2.0,
+    "tilted steps": lambda: _steps(0.0) + 0.01 * np.arange(NX),
+    "tilted steps along y": lambda: _steps(0.0, axis=0) + 0.01 * np.arange(NX),
     "mirror with one bump": lambda: np.maximum(0, 100 - np.hypot(*np.mgrid[-36:36, -30:30]) ** 2),
     "hills on a plane": lambda: np.maximum(0, gaussian_filter(np.random.default_rng(0).standard_normal((NY, NX)), 3)),
     "skin": skin,

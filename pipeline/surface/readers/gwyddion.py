@@ -55,7 +55,7 @@ def read(path: Path, channel: str | None) -> Scan:
         tuple(names),
         "Gwyddion .gwy",
         library_version("gwyfile"),
-        mask,
+        mask=mask,
     )
 
 
