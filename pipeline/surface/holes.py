@@ -37,7 +37,7 @@ _PLATEAU_SHARE, _PLATEAU, _NEAREST, _ROUNDING = 0.01, 10, 5, 1e-6
 # a row of one value is not measured where neighbours in other rows differ in more than this share, and where at most
 # this share of their samples, or so many times a typical value's share, holds the value
 _ROUGH, _RARE, _TYPICAL = 0.2, 0.02, 4.0
-# the share where such rows hold different values, as flat parts of a tilted, smooth surface do
+# the share where such rows hold different values or lie within the scan, as rows of coarse codes do by chance
 _VERY_ROUGH = 0.8
 _LEAST_ROWS = 8
 # bends of a straight row, in those of typical samples: what is left is rounding
@@ -262,11 +262,15 @@ def _constant_lines(heights: Array, hole: Mask) -> tuple[Mask, list[float]]:
     high = np.max(heights, axis=1, where=known, initial=-np.inf)
     constant = (low == high) & (np.count_nonzero(known, axis=1) >= max(2, hole.shape[1] // 2))
     rough = np.flatnonzero(low < high)
-    least = _ROUGH if constant.any() and np.ptp(low[constant]) == 0 else _VERY_ROUGH
-    if not constant.any() or rough.size < _LEAST_ROWS or not _is_rough(heights[rough], known[rough], least):
+    if not constant.any() or rough.size < _LEAST_ROWS:
+        return new, []
+    least = _ROUGH if np.ptp(low[constant]) == 0 and _is_edge_block(constant) else _VERY_ROUGH
+    if not _is_rough(heights[rough], known[rough], least):
         return new, []
     others = np.sort(heights[rough][known[rough]])
     counts = np.unique(_sample(others), return_counts=True)[1]
+    if counts.size < _LEAST_VALUES:
+        return new, []
     # continuous values are held once each
     typical = float(np.median(counts)) / counts.sum() if np.median(counts) > 1 else 0.0
     levels = np.unique(low[constant])
