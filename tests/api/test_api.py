@@ -252,3 +252,12 @@ def test_files_that_code_reads_are_published() -> None:
     }
     assert packaged == present
     assert {".cl", ".glsl", ".in", ".csv"} <= {path.suffix for path in packaged}
+
+
+def test_load_scan_warns_of_what_was_not_measured(tmp_path: Path) -> None:
+    heights = np.random.default_rng(0).standard_normal((40, 40))
+    heights[30:] = 0.0
+    np.save(tmp_path / "stopped.npy", heights)
+    with pytest.warns(UserWarning, match=r"stopped\.npy: 25 % of the scan was not measured"):
+        field = load_scan(tmp_path / "stopped.npy", pitch_um=0.1, height_unit="nm")
+    assert field.shape == (30, 40)

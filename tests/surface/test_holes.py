@@ -409,3 +409,23 @@ def test_a_scan_of_which_little_is_left_is_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "stopped.npy", heights)
     with pytest.raises(InputError, match="5 x 60"):
         load_scan(SurfaceSource(path=str(tmp_path / "stopped.npy"), pitch_um=0.1, height_unit="nm"))
+
+
+@pytest.mark.parametrize(("use", "holes", "told"), [(None, 0, True), ("ignore", 0, False), ("holes", 96, True)])
+def test_the_mask_of_a_gwyddion_file(tmp_path: Path, use: Any, holes: int, told: bool) -> None:
+    gwyfile = pytest.importorskip("gwyfile")
+    from gwyfile.objects import GwyContainer, GwyDataField, GwySIUnit
+
+    metres = GwySIUnit(unitstr="m")
+    covered = np.zeros((NY, NX))
+    # stored with the top row first
+    covered[:8, 10:22] = 1.0
+    field = GwyDataField(1e-9 * skin()[::-1], xreal=6e-6, yreal=7.2e-6, si_unit_xy=metres, si_unit_z=metres)
+    content = GwyContainer({"/0/data": field, "/0/data/title": "Height", "/0/mask": GwyDataField(covered)})
+    path = tmp_path / "masked.gwy"
+    content.tofile(str(path))
+    assert gwyfile.load(str(path))["/0/mask"] is not None
+    heights, record = load_scan(SurfaceSource(path=str(path), mask=use))
+    assert (record.holes, record.masked_share) == (holes, 96 / (NY * NX))
+    assert bool(record.warnings) == told
+    assert np.isnan(heights.heights_um[-8:, 10:22]).all() == (holes > 0)
