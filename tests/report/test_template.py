@@ -19,6 +19,7 @@ VALUES: dict[str, Any] = {
     "errors": [],
     "relative_errors": [],
     "pictures": {"surface": b"", "convergence": b""},
+    "certifies": "",
     "studied": "",
 }
 
