@@ -16,6 +16,8 @@ class Scan:
     full_code: the largest code that an image can store (255, 65535); None for other formats.
     channel: the name of this channel. channels: the names of all channels that may hold heights.
     format: the format in words. reader: the library that read it, with its version.
+    steps: sample distance along (x, y) in a unit that the file does not state; only its ratio can be checked.
+    unread: lines of a header with numbers or units that were not understood.
     """
 
     heights: NDArray[np.float64]
@@ -26,3 +28,5 @@ class Scan:
     channels: tuple[str, ...]
     format: str
     reader: str
+    steps: tuple[float, float] | None = None
+    unread: tuple[str, ...] = ()

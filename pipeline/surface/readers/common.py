@@ -24,8 +24,15 @@ _MICROMETRES = {
 # the micro sign, the Greek letter mu, and "~", which Nanoscope writes for them
 _AS_MICRO = str.maketrans({"\u00b5": "u", "\u03bc": "u", "~": "u"})
 
-_HEIGHT_NAME = re.compile(r"height|topo|z[ _-]?(sensor|axis|scan)|^z\b", re.IGNORECASE)
-_RETURN_NAME = re.compile(r"retrace|backward|bwd", re.IGNORECASE)
+_HEIGHT_NAME = re.compile(r"height|topo|z[ _-]?(sensor|axis|scan)|^z\b|elevation|höhe|hauteur", re.IGNORECASE)
+_RETURN_NAME = re.compile(r"retrace|backward|bwd|\breverse", re.IGNORECASE)
+# heights by a sensor are truer than those by the voltage on a piezo, which creeps and bends
+_SENSOR_NAME = re.compile(r"sens|measured", re.IGNORECASE)
+_NO_HEIGHT_NAME = re.compile(
+    r"deflection|amplitude|phase|error|friction|lateral|adhesion|dissipation|deformation|indentation|stiffness|"
+    r"modulus|current|intensity|texture|potential|bias|voltage|lock-?in|frequency|drive|damping|\bdfl|\bmag\b",
+    re.IGNORECASE,
+)
 
 
 def micrometres(unit: str) -> float | None:
@@ -119,10 +126,14 @@ def unique_names(names: Sequence[str]) -> list[str]:
     return unique
 
 
-def pick_channel(file: str, names: Sequence[str], wanted: str | None) -> int:
-    """Chooses the channel to read: the one wanted, else the first that is named like heights, traces before retraces.
+def pick_channel(file: str, names: Sequence[str], wanted: str | None, *, sole: bool = False) -> int:
+    """Chooses the channel to read: the one wanted, else heights by name.
 
-    file: its name, for messages. names: of the channels. wanted: one of them, or None.
+    Of several channels that are named like heights, one by a sensor comes first, then the trace before the retrace,
+    then the first in the file. A channel that is named like another quantity is never taken unasked.
+
+    file: its name, for messages. names: of the channels. wanted: one of them, or None. sole: whether the format has
+        one channel of heights, whatever its name.
     Returns an index into `names`.
     Raises InputError where no channel fits, or more than one.
     """
@@ -131,13 +142,17 @@ def pick_channel(file: str, names: Sequence[str], wanted: str | None) -> int:
         raise fault(file, "a channel of heights", "none in a unit of length", "export the height channel")
     if wanted is not None:
         return _named(file, names, wanted)
-    likely = [i for i, name in enumerate(names) if _HEIGHT_NAME.search(name)]
-    forward = [i for i in likely if not _RETURN_NAME.search(names[i])]
-    if forward or likely:
-        return (forward or likely)[0]
-    if len(names) > 1:
-        raise fault(file, "one channel of heights", f"channels {listed}", "choose by surface.channel")
-    return 0
+    other = [_NO_HEIGHT_NAME.search(name) is not None for name in names]
+    likely = [i for i, name in enumerate(names) if _HEIGHT_NAME.search(name) and not other[i]]
+    if likely:
+        return min(likely, key=lambda i: (not _SENSOR_NAME.search(names[i]), bool(_RETURN_NAME.search(names[i])), i))
+    if sole:
+        return 0
+    unnamed = [i for i in range(len(names)) if not other[i]]
+    if len(unnamed) == 1 and len(names) == 1:
+        return 0
+    found = f"channels {listed}" if len(names) > 1 else f"only {listed}"
+    raise fault(file, "one channel of heights", found, "choose by surface.channel if it holds heights")
 
 
 def _named(file: str, names: Sequence[str], wanted: str) -> int:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.surface.readers.common import fault, one_line
+from pipeline.surface.readers.text import utf16_without_mark
 
 # first bytes -> format key of readers.read_scan
 _MAGIC = (
@@ -59,7 +60,7 @@ def sniff(path: Path) -> str:
     for magic, key in _MAGIC:
         if head.startswith(magic):
             return _tiff_kind(path) if key == "tiff" else key
-    if not _is_text(head):
+    if not _is_text(head) and utf16_without_mark(head) is None:
         raise _unknown(path, head)
     if path.suffix.lower() in _BINARY_SUFFIXES:
         raise fault(
