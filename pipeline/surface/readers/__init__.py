@@ -6,7 +6,7 @@ which are imported only when a file needs them.
 
 from pathlib import Path
 
-from pipeline.surface.readers import array, gwyddion, image, nanonis, spm, text
+from pipeline.surface.readers import array, gwyddion, image, nanonis, nanosurf, spm, text
 from pipeline.surface.readers.sniff import sniff
 from pipeline.surface.scan import Scan
 
@@ -17,6 +17,7 @@ _READERS = {
     "text": text.read,
     "gwyddion": gwyddion.read,
     "nanonis": nanonis.read,
+    "nanosurf": nanosurf.read,
 }
 
 

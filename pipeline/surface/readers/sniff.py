@@ -23,7 +23,7 @@ _MAGIC = (
     (b"\\*File list", "di"),
     (b"\\*EC File list", "di"),
     (b"?*File list", "di"),
-    (b"[DataSet]", "ezd"),
+    (b"[DataSet]", "nanosurf"),
     (b"WSxM file copyright", "wsxm"),
     (b"fileType  ", "mi"),
     (b"\x05\x00", "ibw"),
@@ -49,7 +49,8 @@ _HEAD_BYTES = 4096
 
 
 def sniff(path: Path) -> str:
-    """Returns the key of a file's format: "image", "text", "npy", "npz", "gwyddion", "nanonis" or one of spm.FORMATS.
+    """Returns the key of a file's format: "image", "text", "npy", "npz", "gwyddion", "nanonis",
+    "nanosurf" or one of spm.FORMATS.
 
     Raises InputError where the file cannot be opened, is empty, or has a format that no reader knows.
     """
