@@ -1,10 +1,10 @@
 """Recognises the format of a scan file by its content, and by its suffix where the content is ambiguous."""
 
 import codecs
-import struct
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.surface.readers import tiff
 from pipeline.surface.readers.common import fault, one_line
 from pipeline.surface.readers.text import utf16_without_mark
 
@@ -101,21 +101,7 @@ def _is_text(head: bytes) -> bool:
 
 def _tiff_kind(path: Path) -> str:
     """Distinguishes images from TIFFs of Park and JPK, which keep heights in private tags, and a preview as image."""
-    tags = _tiff_tags(path)
-    if _PARK_MAGIC_TAG in tags:
+    found = tiff.tags(path)
+    if _PARK_MAGIC_TAG in found:
         return "ps"
-    return "jpk" if _JPK_FORMAT_TAG in tags else "image"
-
-
-def _tiff_tags(path: Path) -> frozenset[int]:
-    """Reads the tags of the first page of a classic TIFF; an empty set where the file is truncated."""
-    with path.open("rb") as file:
-        order = "<" if file.read(2) == b"II" else ">"
-        try:
-            _, start = struct.unpack(f"{order}HI", file.read(6))
-            file.seek(start)
-            (count,) = struct.unpack(f"{order}H", file.read(2))
-            entries = [struct.unpack(f"{order}HHII", file.read(12)) for _ in range(count)]
-        except struct.error:
-            return frozenset()
-    return frozenset(entry[0] for entry in entries)
+    return "jpk" if _JPK_FORMAT_TAG in found else "image"

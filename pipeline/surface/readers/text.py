@@ -87,8 +87,8 @@ def read(path: Path, channel: str | None) -> Scan:
         (name,),
         form,
         library_version("numpy"),
-        relative,
-        header.unread,
+        steps=relative,
+        unread=header.unread,
     )
 
 
