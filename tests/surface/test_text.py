@@ -348,5 +348,15 @@ def test_texts_of_the_field(name: str, um_per_unit: float | None, pitch: float |
 
 
 def test_text_before_binary_data_is_named() -> None:
-    with pytest.raises(InputError, match="binary data behind a text header"):
+    with pytest.raises(InputError, match="a Createc"):
         field("text_header_then_binary.dat")
+
+
+@pytest.mark.parametrize("header", [b"key = 1\r\n", b"key = 1\r\n" * 1000])
+def test_binary_data_behind_any_text_is_said(tmp_path: Path, header: bytes) -> None:
+    path = tmp_path / "scan.dat"
+    path.write_bytes(header + bytes(range(256)))
+    with pytest.raises(InputError) as caught:
+        read_scan(path, None)
+    assert "remove that line" not in str(caught.value)
+    assert "binary data behind a text header" in str(caught.value) or "unknown content" in str(caught.value)

@@ -31,7 +31,8 @@ _AS_MICRO = str.maketrans({"\u00b5": "u", "\u03bc": "u", "~": "u"})
 
 _MISSING_BYTES = re.compile(
     r"truncat|not large enough|too (?:short|small)|end[- ]of[- ]file|unexpected end|eof\b|buffer|reshape|incomplete|"
-    r"not enough|corrupt|fewer (?:bytes|items)|broken|requires? .*bytes|expected \d+ bytes|could only read",
+    r"not enough|corrupt|not a valid zip|fewer (?:bytes|items)|broken|requires? .*bytes|expected \d+ bytes|"
+    r"could only read",
     re.IGNORECASE,
 )
 

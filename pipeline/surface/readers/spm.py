@@ -1,7 +1,7 @@
-"""Reads the formats of scanning probe microscopes that SurfaceTopography supports."""
+"""Reads the formats of microscopes and profilometers that SurfaceTopography supports."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from io import BytesIO
@@ -25,45 +25,53 @@ from pipeline.surface.readers.common import (
     third_party,
     unique_names,
 )
+from pipeline.surface.readers.formats import BY_LIBRARY, LIBRARY
 from pipeline.surface.scan import Scan
 
-# SurfaceTopography's name of the format -> the format in words
-FORMATS = {
-    "di": "Bruker/Veeco Nanoscope",
-    "ibw": "Igor binary wave",
-    "jpk": "JPK image scan",
-    "wsxm": "WSxM",
-    "mi": "Agilent/Molecular Imaging .mi",
-    "ps": "Park Systems TIFF",
-}
-_LIBRARY = "SurfaceTopography"
+_LIBRARY = LIBRARY
+_ARRAYS = ("h5", "mat")
 # tifffile, which it uses, logs faults of damaged files, and logging prints to stderr where no handler is set
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
 def read(path: Path, key: str, channel: str | None) -> Scan:
-    """Reads one height channel of a file in the format `key` of FORMATS.
+    """Reads one height channel of a file in the format `key` of formats.BY_LIBRARY.
 
     Raises InputError where the file is damaged or has no such channel.
     """
-    with third_party(path.name, f"a {FORMATS[key]} file", _LIBRARY), _without_dates():
+    with third_party(path.name, f"{BY_LIBRARY[key]} data", _LIBRARY), _without_dates():
         channels = _channels(path, key)
         labels = igor.labels(path) if key == "ibw" else [_clean(c.name) for c in channels]
-        candidates = [
-            (c, label, unit)
-            for c, label in zip(channels, labels, strict=True)
-            if (unit := _height_unit(c)) is not None
-        ]
+        maps = [(c, label) for c, label in zip(channels, labels, strict=True) if c.dim == 2]
+        candidates: list[tuple[Any, str, float | None]]
+        candidates = [(c, label, unit) for c, label in maps if (unit := _height_unit(c)) is not None]
+        # arrays of HDF5 and MATLAB have no unit
+        candidates = candidates or [(c, label, None) for c, label in maps if c.unit is None and c.data_unit is None]
         plain = unique_names([label for _, label, _ in candidates])
         names = _names([c for c, _, _ in candidates], [label for _, label, _ in candidates])
         wanted = names[plain.index(channel)] if channel in plain else channel
         index = pick_channel(path.name, names, wanted)
         chosen, _, unit = candidates[index]
         check_shape(path.name, chosen.nb_grid_pts[::-1])
-        heights = _heights(chosen.topography().heights())
-        pitch = _pitch(path, key, chosen, unit)
-        form = ", ".join((FORMATS[key], *_direction(chosen)))
-    return Scan(heights, unit, pitch, None, names[index], tuple(names), form, library_version(_LIBRARY))
+        sizes = {} if chosen.physical_sizes is not None else {"physical_sizes": chosen.nb_grid_pts}
+        stored = chosen.topography(**sizes).heights()
+        # arrays lie as in .npy; the library takes their first axis for x
+        heights = _filled(stored) if key in _ARRAYS else _heights(stored)
+        steps = _steps(path, key, chosen)
+        pitch = None if steps is None or unit is None else (steps[0] * unit, steps[1] * unit)
+        form = ", ".join((BY_LIBRARY[key], *_direction(chosen)))
+    reader = library_version(_LIBRARY)
+    return Scan(
+        heights,
+        unit,
+        pitch,
+        None,
+        names[index],
+        tuple(names),
+        form,
+        reader,
+        steps=steps if pitch is None else None,
+    )
 
 
 def _channels(path: Path, key: str) -> Sequence[Any]:
@@ -72,11 +80,11 @@ def _channels(path: Path, key: str) -> Sequence[Any]:
     from SurfaceTopography.IO import open_topography
 
     try:
-        found: Sequence[Any] = open_topography(str(path), format=key).channels
+        found: Sequence[Any] = open_topography(_source(path, key), format=key).channels
     except CorruptFile:
         raise
     except UnsupportedFormatFeature as error:
-        raise fault(path.name, f"a {FORMATS[key]} file with an image", one_line(str(error)), EXPORT) from None
+        raise fault(path.name, f"{BY_LIBRARY[key]} data with an image", one_line(str(error)), EXPORT) from None
     except Exception:
         if key != "di":
             raise
@@ -85,6 +93,15 @@ def _channels(path: Path, key: str) -> Sequence[Any]:
         if not found:
             raise
     return found
+
+
+def _source(path: Path, key: str) -> str | Callable[[], BytesIO]:
+    """Returns what the library opens. It knows .sdf by the name of the ISO, and not by the older one of the BCR."""
+    if key != "sdf":
+        return str(path)
+    data = path.read_bytes()
+    data = data[:1] + b"ISO" + data[4:]
+    return lambda: BytesIO(data)
 
 
 def _alone(data: bytes) -> Sequence[Any]:
@@ -156,19 +173,25 @@ def _heights(stored: Any) -> NDArray[np.float64]:
     preview inside a Park file (heights().T), and with another program's reading of a Nanoscope file, which stores the
     bottom line first (heights().T[::-1]).
     """
-    filled = np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan)
-    return np.ascontiguousarray(filled.T[::-1])
+    return np.ascontiguousarray(_filled(stored).T[::-1])
 
 
-def _pitch(path: Path, key: str, channel: Any, um_per_unit: float) -> tuple[float, float]:
-    """Computes the pitch along (x, y), um: size of the field over number of samples."""
+def _filled(stored: Any) -> NDArray[np.float64]:
+    """Fills the samples that the library masks with NaN."""
+    return np.ascontiguousarray(np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan))
+
+
+def _steps(path: Path, key: str, channel: Any) -> tuple[float, float] | None:
+    """Computes the sample distance along (x, y) in the channel's unit: size of the field over number of samples."""
+    if channel.physical_sizes is None:
+        return None
     notes = _notes(channel)
     nx, ny = (int(n) for n in channel.nb_grid_pts)
     size_x, size_y = (float(size) for size in channel.physical_sizes)
     size_x, size_y = _field(size_x, nx, notes.get("FastScanSize")), _field(size_y, ny, notes.get("SlowScanSize"))
     if key == "di":
         size_y = nanoscope.slow_size((size_x, size_y), (nx, ny), notes, nanoscope.scan_list(path))
-    return size_x * um_per_unit / nx, size_y * um_per_unit / ny
+    return size_x / nx, size_y / ny
 
 
 def _field(size: float, n: int, scan_size: str | None) -> float:
