@@ -123,6 +123,36 @@ def test_lines_that_are_not_understood_stop_a_guess(tmp_path: Path, line: str) -
     assert load_scan(SurfaceSource(path=str(path), override_file_units=True, **keys))[1].unit_from == "config"
 
 
+@pytest.mark.parametrize(
+    ("header", "um_per_unit", "pitch"),
+    [
+        ('"Height(nm)"\n', 1e-3, None),
+        ("Scan Size X\t1.6 um\nScan Size Y\t2.4 um\nZ Unit\tnm\n[Header end]\n", 1e-3, (0.1, 0.2)),
+        ("Width (um)\t1.6\nHeight (um)\t2.4\nUnit\tnm\n", 1e-3, (0.1, 0.2)),
+    ],
+)
+def test_headers_without_marks(
+    tmp_path: Path, header: str, um_per_unit: float, pitch: tuple[float, float] | None
+) -> None:
+    scan = read_scan(save(tmp_path, header + body(TOP_FIRST)), None)
+    np.testing.assert_array_equal(scan.heights, TOP_FIRST.round(4)[::-1])
+    assert scan.um_per_unit == um_per_unit
+    assert scan.pitch_um == (None if pitch is None else pytest.approx(pitch))
+
+
+@pytest.mark.parametrize("line", ["nm", "0.37 per unit of height", "16 12"])
+def test_a_line_that_may_state_a_unit_is_marked_and_not_removed(tmp_path: Path, line: str) -> None:
+    message = message_of(save(tmp_path, f"{line}\n" + body(TOP_FIRST)))
+    assert "begin it with '#'" in message
+    assert "remove" not in message
+
+
+def test_first_row_of_empty_cells_is_a_row(tmp_path: Path) -> None:
+    scan = read_scan(save(tmp_path, "\t" * 15 + "\n" + body(TOP_FIRST[1:])), None)
+    assert scan.heights.shape == TOP_FIRST.shape
+    assert np.isnan(scan.heights[-1]).all()
+
+
 def test_harmless_lines_stop_nothing(tmp_path: Path) -> None:
     path = save(
         tmp_path, "# Scan rate: 1 Hz\n# Date: 2020-01-01\n# made by hand\n# samples 3 of 4\n" + body(TOP_FIRST)

@@ -53,7 +53,7 @@ _SCALE_WORDS = re.compile(
     r"skal|échelle|escala|scala|единиц|單位|单位|単位",
     re.IGNORECASE,
 )
-_LENGTH = re.compile(r"\d\s*(?:[munpfµμ~]|Å|c)?(?:m|Å)\b(?!/s)")
+_LENGTH = re.compile(r"\d\s*(?:[munpfµμ~]|Å|c)?(?:m|Å)\b(?!/s)|\b(?:[nupµμ]m|Å)\b")
 
 
 @dataclass

@@ -17,12 +17,13 @@ from pipeline.surface.readers.common import (
     one_line,
     pick_channel,
 )
-from pipeline.surface.readers.header import Header, understand
+from pipeline.surface.readers.header import Header, may_state_scale, understand
 from pipeline.surface.scan import Scan
 
 _NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
-# rows with nothing but digits, points and separators need no look at each cell
-_PLAIN = re.compile(r"(?:[.,;\d\seE]|[-+](?=[\d.,]))*\d(?:[.,;\d\seE]|[-+](?=[\d.,]))*")
+# rows with nothing but these need no look at each cell, unless a sign stands alone
+_PLAIN = frozenset("0123456789.,;eE+- \t\r")
+_LONE_SIGN = re.compile(r"[-+](?:[^\d.,]|$)")
 _EXCEL_ERROR = re.compile(r"#(?:n/a|num!|value!|div/0!|ref!|name\?|null!)", re.IGNORECASE)
 _VOID = re.compile(
     r"|[-+]?nan(?:\(\w*\))?|-?1\.#\w+|bad|void|null|none|nil|masked|invalid|n/?a|#n/?a|#\w+[!?/]\w*!?|-+|–|—|\*+|\?+|_+",
@@ -31,8 +32,12 @@ _VOID = re.compile(
 _INFINITY = re.compile(r"[-+]?inf(?:inity)?", re.IGNORECASE)
 _COMMENT = ("#", "%", "//", "!")
 _REMOVE = "remove that line, or begin it with '#'"
+# lines that may state a unit are read behind a '#', and lost where they are removed
+_MARK = "begin it with '#' if it is no row of heights"
 _WRITE_NAN = "write NaN for a sample that was not measured: a row that is removed shifts the rest"
 _CUT = "the file may be cut short: copy or export it again"
+# Nanoscope's text export has one line such as "Height(nm)"
+_QUANTITY_NAME = re.compile(r"[\"']?([A-Za-z][\w ]*?)\s*[(\[]\s*([^)\]\d]{1,3})\s*[)\]][\"']?")
 _AXIS_NAME = re.compile(r"\W*([xyz])\b[^(\[]*(?:[(\[]\s*([^)\]]*)\s*[)\]])?\W*", re.IGNORECASE)
 # largest deviation of evenly spaced axis labels from their mean step
 _EVEN = 1e-3
@@ -124,12 +129,13 @@ def _split(path: Path, content: str) -> _Content:
     """Separates the header from the rows of numbers. Raises InputError for a line that is neither."""
     lines = content.splitlines()
     separator, decimal_comma = _separator(path, lines)
+    usual = _typical_row(lines).count("\t")
     found = _Content([], [], [], [], separator, decimal_comma)
     for number, line in enumerate(lines, start=1):
         stripped = line.strip()
         if not stripped:
             # a row of nothing but separators is a row that was not measured
-            if separator == "\t" and found.rows and line.count("\t") == found.rows[-1].count("\t") > 0:
+            if separator == "\t" and line.count("\t") == usual:
                 found.rows.append(line)
                 found.numbers.append(number)
             continue
@@ -137,7 +143,7 @@ def _split(path: Path, content: str) -> _Content:
             if not found.rows:
                 found.header.append(line)
             continue
-        if (_PLAIN.fullmatch(stripped) and stripped[0] not in ":=") or _is_row(line, separator, bool(found.rows)):
+        if _is_plain(stripped) or _is_row(line, separator, bool(found.rows)):
             found.rows.append(line)
             found.numbers.append(number)
         else:
@@ -160,12 +166,24 @@ def _take_header_line(path: Path, content: _Content, line: str, number: int) -> 
         raise fault(path.name, "numbers", found, _WRITE_NAN)
     if re.match(r"[^:=]+[:=]", stripped) or re.fullmatch(r"[A-Za-z_]+\s+[-+.\deE]+", stripped):
         content.header.append(line)
+    elif _is_entry(filled := [cell for cell in cells if cell]):
+        content.header.append(f"{filled[0]}: {filled[1]}")
+    elif match := _QUANTITY_NAME.fullmatch(stripped):
+        content.header.extend((f"Channel: {match[1]}", f"Value units: {match[2]}"))
     elif _names_columns(cells, content.separator):
         content.names[:] = cells
-    elif re.fullmatch(r"\W+", stripped):
+    elif re.fullmatch(r"\W+|\[[^\]]*\]", stripped):
         return
     else:
-        raise fault(path.name, "numbers", f"{one_line(stripped, 40)!r} in line {number}", _REMOVE)
+        way_out = _MARK if re.search(r"\d", stripped) or may_state_scale(stripped) else _REMOVE
+        raise fault(path.name, "numbers", f"{one_line(stripped, 40)!r} in line {number}", way_out)
+
+
+def _is_entry(cells: list[str]) -> bool:
+    """Says whether a line above the numbers is a key and its value in two cells."""
+    if len(cells) != 2 or _is_cell(cells[0]):
+        return False
+    return re.match(_NUMBER, cells[1]) is not None or micrometres(cells[1]) is not None
 
 
 def _names_columns(cells: list[str], separator: str | None) -> bool:
@@ -214,6 +232,21 @@ def _cells(line: str, separator: str | None) -> list[str]:
     return [cell.strip().strip("\"'").strip() for cell in cells]
 
 
+def _is_plain(row: str) -> bool:
+    return _PLAIN.issuperset(row) and re.search(r"\d", row) is not None and _LONE_SIGN.search(row) is None
+
+
+def _has_empty_cell(row: str, separator: str | None) -> bool:
+    if separator is None:
+        return False
+    row = row.strip(" \r\n")
+    return (
+        row.startswith(separator)
+        or row.endswith(separator)
+        or re.search(rf"{separator} *{separator}", row) is not None
+    )
+
+
 def _is_cell(cell: str) -> bool:
     return any(form.fullmatch(cell) for form in (_NUMBER, _VOID, _INFINITY))
 
@@ -233,12 +266,8 @@ def _table(path: Path, content: _Content) -> NDArray[np.float64]:
     rows, separator = content.rows, content.separator
     if separator is not None:
         rows = _without_outer_separators(rows, separator)
-    empty = None if separator is None else re.compile(rf"(?:^|{separator})[^\S\t]*(?:{separator}|$)")
     rows = [
-        _with_nan(row, separator)
-        if not _PLAIN.fullmatch(row) or (empty is not None and empty.search(row.replace("\t\t", "\t \t")))
-        else row
-        for row in rows
+        row if _is_plain(row) and not _has_empty_cell(row, separator) else _with_nan(row, separator) for row in rows
     ]
     if content.decimal_comma:
         rows = [row.replace(",", ".") for row in rows]
@@ -272,7 +301,7 @@ def _uneven(path: Path, content: _Content, rows: list[str], cause: str) -> Excep
     if odd is None:
         return fault(path.name, "rows of numbers", one_line(cause, 80), _WRITE_NAN)
     found = f"{lengths[odd]} in line {content.numbers[odd]} where others have {usual}"
-    way_out = _CUT if odd == len(rows) - 1 else _WRITE_NAN
+    way_out = {0: _MARK, len(rows) - 1: _CUT}.get(odd, _WRITE_NAN)
     return fault(path.name, "rows of equally many numbers", f"{found} (the number of columns changed)", way_out)
 
 
