@@ -1,5 +1,6 @@
 """Samples of images and arrays as the file states them; channels of Gwyddion's containers."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -158,3 +159,15 @@ def test_grey_png_is_as_before(tmp_path: Path) -> None:
     scan = read_scan(tmp_path / "s.png", None)
     np.testing.assert_array_equal(scan.heights, stored[::-1])
     assert (scan.full_code, scan.steps) == (255, None)
+
+
+def test_damaged_tags_raise_no_other_error(tmp_path: Path) -> None:
+    path = write_tiff(tmp_path / "s.tif", RNG.normal(size=(10, 12)))
+    sound = path.read_bytes()
+    for _ in range(200):
+        data = bytearray(sound)
+        for place in RNG.integers(4, 300, 3):
+            data[place] = RNG.integers(256)
+        path.write_bytes(bytes(data))
+        with suppress(InputError):
+            read_scan(path, None)

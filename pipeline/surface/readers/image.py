@@ -1,5 +1,6 @@
 """Reads grey images as height maps: codes up to full_code, the first row at the top, without units."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -19,6 +20,8 @@ from pipeline.surface.readers.common import (
 )
 from pipeline.surface.scan import Scan
 
+# Pillow logs faults of damaged files, and logging prints to stderr where no handler is set
+logging.getLogger("PIL").addHandler(logging.NullHandler())
 _CHANNEL = "grey"
 _EXPECTED = "a PNG, TIFF or BMP image"
 _WAY_OUT = "save it as 8- or 16-bit grey PNG or TIFF"
@@ -59,6 +62,7 @@ def read(path: Path, channel: str | None) -> Scan:
         # given a name instead of a file, Pillow maps bytes into memory and garbles those that Orientation turns
         with third_party(path.name, _EXPECTED, "Pillow"), path.open("rb") as file, _opened(path, file) as opened:
             pixels = _by_pillow(path, opened, kind, found)
+    check_shape(path.name, pixels.stored.shape)
     heights = np.ascontiguousarray(pixels.stored[::-1], dtype=np.float64)
     if (no_data := tiff.number(found, tiff.NO_DATA)) is not None:
         # the text of the tag may have more digits than the samples
@@ -159,6 +163,8 @@ def _by_tifffile(path: Path, kind: tuple[int, int], found: tiff.Tags) -> _Pixels
                     raise
                 found_so = f"one compressed by {getattr(page.compression, 'name', page.compression)}"
                 raise fault(path.name, "an uncompressed TIFF", found_so, "save it without compression") from None
+    # a damaged file may decode to another shape than its tags promise
+    check_shape(path.name, stored.shape)
     stored = _turned(stored, int(tiff.number(found, tiff.ORIENTATION) or 1))
     if stored.dtype.kind not in "iuf":
         raise fault(path.name, "grey codes or floats", f"pixels of type {stored.dtype}", _WAY_OUT)

@@ -1,6 +1,7 @@
 """Reads Nanosurf's .nid and .ezd files: sections of key=value, then the samples of every data set."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,17 +72,27 @@ def read(path: Path, channel: str | None) -> Scan:
         raise fault(path.name, _EXPECTED, found, _CUT)
     codes = np.frombuffer(data, chosen.sample, rows * columns, chosen.start).reshape(rows, columns)
     entries = chosen.entries
-    span, low = float(entries["Dim2Range"]), float(entries.get("Dim2Min", 0))
+    with _valid_entries(path):
+        span, low = float(entries["Dim2Range"]), float(entries.get("Dim2Min", 0))
+        px, py = (
+            float(entries[f"Dim{axis}Range"]) * (micrometres(entries[f"Dim{axis}Unit"]) or 0.0) / n
+            for axis, n in ((0, columns), (1, rows))
+        )
     middle = low + span / 2 if chosen.sample.kind == "i" else low
     heights = middle + codes * (span / 2.0 ** (8 * chosen.sample.itemsize))
     heights[_unscanned(entries, codes)] = np.nan
-    px, py = (
-        float(entries[f"Dim{axis}Range"]) * (micrometres(entries[f"Dim{axis}Unit"]) or 0.0) / n
-        for axis, n in ((0, columns), (1, rows))
-    )
     unit = micrometres(entries["Dim2Unit"])
     reader = library_version("numpy")
     return Scan(heights, unit, (px, py), None, names[index], tuple(names), "Nanosurf .nid/.ezd", reader)
+
+
+@contextmanager
+def _valid_entries(path: Path) -> Iterator[None]:
+    """Turns the error of an entry that is absent or no number into an InputError."""
+    try:
+        yield
+    except (KeyError, ValueError, TypeError) as error:
+        raise fault(path.name, _EXPECTED, f"a header without a valid entry ({error})", _CUT) from None
 
 
 def _data_sets(path: Path, data: bytes) -> list[_DataSet]:
@@ -89,7 +100,7 @@ def _data_sets(path: Path, data: bytes) -> list[_DataSet]:
     sections, start = _sections(path, data)
     content = sections.get("DataSet", {})
     found = []
-    try:
+    with _valid_entries(path):
         for group in range(int(content["GroupCount"])):
             for number in range(int(content[f"Gr{group}-Count"])):
                 entries = sections.get(content.get(f"Gr{group}-Ch{number}", ""))
@@ -101,8 +112,6 @@ def _data_sets(path: Path, data: bytes) -> list[_DataSet]:
                     raise fault(path.name, "binary data sets", mode, "export the height channel again")
                 found.append(data_set)
                 start += data_set.nbytes
-    except (KeyError, ValueError, TypeError) as error:
-        raise fault(path.name, _EXPECTED, f"a header without a valid entry ({error})", _CUT) from None
     return found
 
 
