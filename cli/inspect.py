@@ -1,7 +1,7 @@
 """`inspect`: the content of a scan, a config or a bundle."""
 
 import json
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,21 @@ from cli import console
     type=click.Choice(["config", "manifest"]),
     help="Print the JSON Schema of configs, or of a bundle's manifest.json, instead of a SOURCE.",
 )
+@click.option("--formats", is_flag=True, help="List the formats of scan files that can be read, instead of a SOURCE.")
 @console.json_option
-def inspect_command(source: Path | None, channel: str | None, schema: str | None, as_json: bool) -> None:
+def inspect_command(
+    source: Path | None, channel: str | None, schema: str | None, formats: bool, as_json: bool
+) -> None:
     """Print the content of SOURCE: a scan file, a config or a bundle's folder. Bakes nothing.
 
     With --schema and no SOURCE: print the JSON Schema of a config or of manifest.json, for programs, and for editors
     that complete and check documents.
     """
+    if formats:
+        if source is not None or channel is not None or schema is not None:
+            raise click.UsageError("--formats takes no SOURCE, no --channel and no --schema")
+        _print_formats(as_json)
+        return
     if schema is not None:
         if source is not None or channel is not None:
             raise click.UsageError("--schema takes no SOURCE and no --channel")
@@ -43,6 +51,16 @@ def inspect_command(source: Path | None, channel: str | None, schema: str | None
         return
     for key, value in found.items():
         click.echo(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
+
+
+def _print_formats(as_json: bool) -> None:
+    from pipeline.surface.readers.formats import READ
+
+    if as_json:
+        console.print_json([asdict(entry) for entry in READ])
+        return
+    for entry in READ:
+        click.echo(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}")
 
 
 def _schema(document: str) -> dict[str, Any]:

@@ -107,7 +107,8 @@ def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: flo
     if is_scan and abs(x / y - 1.0) > _SQUARE:
         found.append(
             f"the pitch differs along x and y ({x:.4g} x {y:.4g} um): this is right for a scan with fewer lines, and "
-            "wrong for a cropped scan whose file still states the original size"
+            "wrong for a cropped scan whose file still states the original size; if it is wrong, "
+            "set surface.pitch_um and override_file_units = true"
         )
     if min(statistics.windows) < 3.99:
         found.append(
@@ -135,4 +136,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 4, (), _parameters, _produce)
+SURFACE = Stage("surface", 5, (), _parameters, _produce)

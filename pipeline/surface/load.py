@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.holes import Measured, Unmeasured, far_apart, measured_part
 from pipeline.surface.readers import read_scan
-from pipeline.surface.readers.common import MIN_SAMPLES, check_shape, fault, micrometres
+from pipeline.surface.readers.common import MIN_SAMPLES, check_shape, fault, micrometres, one_line
+from pipeline.surface.readers.header import may_state_scale
 from pipeline.surface.scan import Scan
 from pipeline.surface.source import SurfaceSource
 from pipeline.validated import as_pair
@@ -179,6 +180,7 @@ def _units(
     unit = _unit(file, scan, surface)
     pitch = _pitch(file, scan, surface)
     if unit is not None and pitch is not None:
+        _check_unread(file, scan, surface, (unit[1], pitch[1]))
         return unit, pitch
     missing = []
     if pitch is None:
@@ -219,6 +221,8 @@ def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple
 def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Origin] | None:
     configured = None if surface.pitch_um is None else as_pair(surface.pitch_um)
     if scan.pitch_um is None:
+        if configured is not None and not surface.override_file_units:
+            _check_ratio(file, scan.steps, configured)
         return None if configured is None else (configured, "config")
     if configured is None or all(_agree(a, b) for a, b in zip(configured, scan.pitch_um, strict=True)):
         return scan.pitch_um, "file"
@@ -226,6 +230,31 @@ def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, 
         return configured, "config"
     found = f"{_pair(scan.pitch_um)} um in the file, but surface.pitch_um = {_pair(configured)}"
     raise fault(file, "pitches that agree", found, _OVERRIDE)
+
+
+def _check_ratio(file: str, steps: tuple[float, float] | None, configured: tuple[float, float]) -> None:
+    """Holds a configured pitch against the ratio of x to y, which a file states even without a unit."""
+    if steps is None or min(steps) <= 0 or _agree(configured[0] * steps[1], configured[1] * steps[0]):
+        return
+    found = f"steps of {_pair(steps)} (of no stated unit) in the file, but surface.pitch_um = {_pair(configured)}"
+    on_y = configured[0] * steps[1] / steps[0]
+    way_out = f"set surface.pitch_um = [{configured[0]:.6g}, {on_y:.6g}], or surface.override_file_units = true"
+    raise fault(file, "a pitch with the file's ratio of x to y", found, way_out)
+
+
+def _check_unread(file: str, scan: Scan, surface: SurfaceSource, origins: tuple[Origin, Origin]) -> None:
+    """Refuses a unit or a pitch of the config where the file's header may state another in words not understood."""
+    doubtful = [line for line in scan.unread if may_state_scale(line)]
+    if not doubtful or surface.override_file_units or "config" not in origins:
+        return
+    listed = one_line("; ".join(repr(line) for line in doubtful), 160)
+    raise fault(
+        file,
+        "a header whose units and factors are understood",
+        f"lines that may state them: {listed}",
+        "write 'Width: 10 um', 'Height: 10 um' and 'Value units: nm' in their place, "
+        "or set surface.override_file_units = true if your keys are right",
+    )
 
 
 def _agree(a: float, b: float) -> bool:

@@ -17,6 +17,8 @@ class Scan:
     channel: the name of this channel. channels: the names of all channels that may hold heights.
     format: the format in words. reader: the library that read it, with its version.
     mask: bool (ny, nx), true where a mask of the file covers the channel; None where it has none.
+    steps: sample distance along (x, y) in a unit that the file does not state; only its ratio can be checked.
+    unread: lines of a header with numbers or units that were not understood.
     """
 
     heights: NDArray[np.float64]
@@ -28,3 +30,5 @@ class Scan:
     format: str
     reader: str
     mask: NDArray[np.bool_] | None = None
+    steps: tuple[float, float] | None = None
+    unread: tuple[str, ...] = ()

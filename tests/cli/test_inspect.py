@@ -112,3 +112,12 @@ def test_files_that_cannot_be_inspected(tool: Tool) -> None:
     result = tool("inspect", SCAN, "--channel", "Phase")
     assert result.code == 3
     assert "only 'Topography'" in result.errors[0]
+
+
+def test_the_formats_are_listed(tool: Tool) -> None:
+    listed = tool("inspect", "--formats")
+    assert listed.code == 0
+    assert {".x3p", ".sur", ".gsf", ".spm"} <= set(listed.stdout.split())
+    keys = [entry["key"] for entry in tool("inspect", "--formats", "--json").json]
+    assert len(keys) == len(listed.stdout.splitlines())
+    assert tool("inspect", SCAN, "--formats").code == 2

@@ -6,7 +6,8 @@ which are imported only when a file needs them.
 
 from pathlib import Path
 
-from pipeline.surface.readers import array, gwyddion, image, nanonis, spm, text
+from pipeline.surface.readers import array, gsf, gwyddion, image, nanonis, nanosurf, spm, text
+from pipeline.surface.readers.formats import BY_LIBRARY
 from pipeline.surface.readers.sniff import sniff
 from pipeline.surface.scan import Scan
 
@@ -16,7 +17,9 @@ _READERS = {
     "npz": array.read_npz,
     "text": text.read,
     "gwyddion": gwyddion.read,
+    "gsf": gsf.read,
     "nanonis": nanonis.read,
+    "nanosurf": nanosurf.read,
 }
 
 
@@ -28,6 +31,6 @@ def read_scan(path: Path, channel: str | None) -> Scan:
     Raises InputError where the file cannot be opened, has an unknown format, is damaged, or lacks the channel.
     """
     key = sniff(path)
-    if key in spm.FORMATS:
+    if key in BY_LIBRARY:
         return spm.read(path, key, channel)
     return _READERS[key](path, channel)

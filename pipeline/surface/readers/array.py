@@ -16,6 +16,7 @@ def read_npy(path: Path, channel: str | None) -> Scan:
     """Reads the array of a .npy file. Raises InputError unless it is 2-D and has real numbers."""
     pick_channel(path.name, [_CHANNEL], channel)
     with third_party(path.name, "a NumPy .npy file", "numpy"):
+        _refuse_objects(path)
         # mapped into memory, so that a shape which is refused is not loaded
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
         heights = _heights(path, stored)
@@ -39,6 +40,20 @@ def read_npz(path: Path, channel: str | None) -> Scan:
         name = names[pick_channel(path.name, names, channel)]
         heights = _heights(path, arrays[name])
     return _scan(heights, name, names, "NumPy .npz")
+
+
+def _refuse_objects(path: Path) -> None:
+    """Refuses an array of Python objects, which cannot be mapped, by the header alone."""
+    with path.open("rb") as file:
+        version = np.lib.format.read_magic(file)
+        if version not in ((1, 0), (2, 0)):
+            return
+        read_header = (
+            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        )
+        _, _, stored = read_header(file)
+    if stored.hasobject:
+        raise fault(path.name, "real numbers", "an array of Python objects", "save the heights as float64")
 
 
 def _matrices(archive: Any) -> dict[str, NDArray[Any]]:

@@ -1,7 +1,9 @@
 """Functions that all readers share: units, limits of the shape, names of channels, and errors."""
 
 import re
+import struct
 import warnings
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
@@ -10,6 +12,9 @@ from pipeline.errors import InputError
 
 MIN_SAMPLES = 8
 MAX_SAMPLES = 8192
+
+# the remedy for files that are sound, but cannot be read here
+EXPORT = "open it in the instrument's program or in Gwyddion and export the height channel as .gwy, .npy or text"
 
 _MICROMETRES = {
     "m": 1e6,
@@ -24,8 +29,23 @@ _MICROMETRES = {
 # the micro sign, the Greek letter mu, and "~", which Nanoscope writes for them
 _AS_MICRO = str.maketrans({"\u00b5": "u", "\u03bc": "u", "~": "u"})
 
-_HEIGHT_NAME = re.compile(r"height|topo|z[ _-]?(sensor|axis|scan)|^z\b", re.IGNORECASE)
-_RETURN_NAME = re.compile(r"retrace|backward|bwd", re.IGNORECASE)
+_MISSING_BYTES = re.compile(
+    r"truncat|not large enough|too (?:short|small)|end[- ]of[- ]file|unexpected end|eof\b|buffer|reshape|incomplete|"
+    r"not enough|corrupt|not a valid zip|fewer (?:bytes|items)|broken|requires? .*bytes|expected \d+ bytes|"
+    r"could only read",
+    re.IGNORECASE,
+)
+
+_HEIGHT_NAME = re.compile(r"height|topo|z[ _-]?(sensor|axis|scan)|^z\b|elevation|höhe|hauteur", re.IGNORECASE)
+_RETURN_NAME = re.compile(r"retrace|backward|bwd|\breverse", re.IGNORECASE)
+_SECOND_NAME = re.compile(r"interleave|\bnap|lift", re.IGNORECASE)
+# heights by a sensor are truer than those by the voltage on a piezo, which creeps and bends
+_SENSOR_NAME = re.compile(r"sens|measured", re.IGNORECASE)
+_NO_HEIGHT_NAME = re.compile(
+    r"deflection|amplitude|phase|error|friction|lateral|adhesion|dissipation|deformation|indentation|stiffness|"
+    r"modulus|current|intensity|texture|potential|bias|voltage|lock-?in|frequency|drive|damping|\bdfl|\bmag\b",
+    re.IGNORECASE,
+)
 
 
 def micrometres(unit: str) -> float | None:
@@ -69,12 +89,15 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         ) from None
     except Exception as error:
         cause = one_line(str(error)) or type(error).__name__
-        raise fault(
-            file,
-            expected,
-            f"content that {library} cannot read ({cause})",
-            "the file may be damaged or cut short: copy or export it again",
-        ) from None
+        raise fault(file, expected, f"content that {library} cannot read ({cause})", _way_out(error)) from None
+
+
+def _way_out(error: Exception) -> str:
+    """Returns the remedy; a file is called damaged only where the error is one of missing bytes."""
+    named_so = type(error).__name__ in ("CorruptFile", "BadZipFile", "IncompleteRead")
+    if named_so or isinstance(error, EOFError | struct.error | zlib.error) or _MISSING_BYTES.search(str(error)):
+        return "the file may be damaged or cut short: copy or export it again"
+    return EXPORT
 
 
 def library_version(library: str) -> str:
@@ -119,10 +142,14 @@ def unique_names(names: Sequence[str]) -> list[str]:
     return unique
 
 
-def pick_channel(file: str, names: Sequence[str], wanted: str | None) -> int:
-    """Chooses the channel to read: the one wanted, else the first that is named like heights, traces before retraces.
+def pick_channel(file: str, names: Sequence[str], wanted: str | None, *, sole: bool = False) -> int:
+    """Chooses the channel to read: the one wanted, else heights by name.
 
-    file: its name, for messages. names: of the channels. wanted: one of them, or None.
+    Of several channels that are named like heights, one by a sensor comes first, then one of the main scan, then a
+    trace, then the first in the file. A channel that is named like another quantity is never taken unasked.
+
+    file: its name, for messages. names: of the channels. wanted: one of them, or None. sole: whether the format has
+        one channel of heights, whatever its name.
     Returns an index into `names`.
     Raises InputError where no channel fits, or more than one.
     """
@@ -131,13 +158,26 @@ def pick_channel(file: str, names: Sequence[str], wanted: str | None) -> int:
         raise fault(file, "a channel of heights", "none in a unit of length", "export the height channel")
     if wanted is not None:
         return _named(file, names, wanted)
-    likely = [i for i, name in enumerate(names) if _HEIGHT_NAME.search(name)]
-    forward = [i for i in likely if not _RETURN_NAME.search(names[i])]
-    if forward or likely:
-        return (forward or likely)[0]
-    if len(names) > 1:
-        raise fault(file, "one channel of heights", f"channels {listed}", "choose by surface.channel")
-    return 0
+    other = [_NO_HEIGHT_NAME.search(name) is not None for name in names]
+    likely = [i for i, name in enumerate(names) if _HEIGHT_NAME.search(name) and not other[i]]
+    if likely:
+        return min(likely, key=lambda i: _rank(names[i]))
+    if sole:
+        return 0
+    unnamed = [i for i in range(len(names)) if not other[i]]
+    if len(unnamed) == 1 and len(names) == 1:
+        return 0
+    found = f"channels {listed}" if len(names) > 1 else f"only {listed}"
+    raise fault(file, "one channel of heights", found, "choose by surface.channel if it holds heights")
+
+
+def _rank(name: str) -> tuple[bool, bool, bool]:
+    """Orders channels of heights: sensors first, then the main scan of each line, then its trace."""
+    return _SENSOR_NAME.search(name) is None, _SECOND_NAME.search(name) is not None, _is_return(name)
+
+
+def _is_return(name: str) -> bool:
+    return _RETURN_NAME.search(name) is not None
 
 
 def _named(file: str, names: Sequence[str], wanted: str) -> int:

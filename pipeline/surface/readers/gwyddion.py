@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import (
     check_shape,
-    fault,
     library_version,
     micrometres,
     pick_channel,
@@ -44,7 +43,7 @@ def read(path: Path, channel: str | None) -> Scan:
         names = unique_names([field.name for field in fields])
         index = pick_channel(path.name, names, channel)
         heights = _heights(path, fields[index].data)
-        pitch = _pitch(path, fields[index].data)
+        pitch, steps = _pitch(fields[index].data)
         mask = _mask(heights, fields[index].mask)
     return Scan(
         heights,
@@ -56,20 +55,25 @@ def read(path: Path, channel: str | None) -> Scan:
         "Gwyddion .gwy",
         library_version("gwyfile"),
         mask=mask,
+        steps=steps,
     )
 
 
 def _height_fields(container: Any) -> list[_Field]:
-    """Lists the fields in a unit of length or without a unit, in the order of their numbers."""
+    """Lists the fields in a unit of length, or where there is none those without a unit, by their numbers.
+
+    A field over another quantity than length, such as a spectrum over frequency, is no height map.
+    """
     numbers = sorted(int(match[1]) for key in container if (match := _DATA_KEY.fullmatch(key)))
     fields = []
     for number in numbers:
         data = container[f"/{number}/data"]
         unit = _unit(data, "si_unit_z")
-        if unit == "" or micrometres(unit) is not None:
+        lateral = _unit(data, "si_unit_xy")
+        if all(text == "" or micrometres(text) is not None for text in (unit, lateral)):
             name = str(container.get(f"/{number}/data/title") or f"channel {number}")
             fields.append(_Field(name, data, micrometres(unit), container.get(f"/{number}/mask")))
-    return fields
+    return [field for field in fields if field.um_per_unit is not None] or fields
 
 
 def _unit(data: Any, key: str) -> str:
@@ -87,11 +91,8 @@ def _mask(heights: NDArray[np.float64], mask: Any) -> NDArray[np.bool_] | None:
     return covered if covered is not None and covered.shape == heights.shape else None
 
 
-def _pitch(path: Path, data: Any) -> tuple[float, float] | None:
-    unit = _unit(data, "si_unit_xy")
-    if unit == "":
-        return None
-    scale = micrometres(unit)
-    if scale is None:
-        raise fault(path.name, "a field in a unit of length", f"one in {unit!r}", "choose another channel")
-    return float(data.xreal) * scale / int(data["xres"]), float(data.yreal) * scale / int(data["yres"])
+def _pitch(data: Any) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """Returns the pitch along (x, y), um, or else the steps in a unit that the file does not state."""
+    steps = float(data.xreal) / int(data["xres"]), float(data.yreal) / int(data["yres"])
+    scale = micrometres(_unit(data, "si_unit_xy"))
+    return (None, steps) if scale is None else ((steps[0] * scale, steps[1] * scale), None)

@@ -1,55 +1,157 @@
-"""Reads the formats of scanning probe microscopes that SurfaceTopography supports."""
+"""Reads the formats of microscopes and profilometers that SurfaceTopography supports."""
 
 import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
+from io import BytesIO
 from math import isclose
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.surface.readers import igor, nanoscope
 from pipeline.surface.readers.common import (
+    EXPORT,
     check_shape,
+    fault,
     library_version,
     micrometres,
+    one_line,
     pick_channel,
     third_party,
     unique_names,
 )
+from pipeline.surface.readers.formats import BY_LIBRARY, LIBRARY
 from pipeline.surface.scan import Scan
 
-# SurfaceTopography's name of the format -> the format in words
-FORMATS = {
-    "di": "Bruker/Veeco Nanoscope",
-    "ibw": "Igor binary wave",
-    "jpk": "JPK image scan",
-    "ezd": "Nanosurf .nid/.ezd",
-    "wsxm": "WSxM",
-    "mi": "Agilent/Molecular Imaging .mi",
-    "ps": "Park Systems TIFF",
-}
-_LIBRARY = "SurfaceTopography"
+_LIBRARY = LIBRARY
+_ARRAYS = ("h5", "mat")
 # tifffile, which it uses, logs faults of damaged files, and logging prints to stderr where no handler is set
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
 def read(path: Path, key: str, channel: str | None) -> Scan:
-    """Reads one height channel of a file in the format `key` of FORMATS.
+    """Reads one height channel of a file in the format `key` of formats.BY_LIBRARY.
 
     Raises InputError where the file is damaged or has no such channel.
     """
-    with third_party(path.name, f"a {FORMATS[key]} file", _LIBRARY):
-        from SurfaceTopography.IO import open_topography
+    with third_party(path.name, f"{BY_LIBRARY[key]} data", _LIBRARY), _without_dates():
+        channels = _channels(path, key)
+        labels = igor.labels(path) if key == "ibw" else [_clean(c.name) for c in channels]
+        maps = [(c, label) for c, label in zip(channels, labels, strict=True) if c.dim == 2]
+        candidates: list[tuple[Any, str, float | None]]
+        candidates = [(c, label, unit) for c, label in maps if (unit := _height_unit(c)) is not None]
+        # arrays of HDF5 and MATLAB have no unit
+        candidates = candidates or [(c, label, None) for c, label in maps if c.unit is None and c.data_unit is None]
+        plain = unique_names([label for _, label, _ in candidates])
+        names = _names([c for c, _, _ in candidates], [label for _, label, _ in candidates])
+        wanted = names[plain.index(channel)] if channel in plain else channel
+        index = pick_channel(path.name, names, wanted)
+        chosen, _, unit = candidates[index]
+        check_shape(path.name, chosen.nb_grid_pts[::-1])
+        sizes = {} if chosen.physical_sizes is not None else {"physical_sizes": chosen.nb_grid_pts}
+        stored = chosen.topography(**sizes).heights()
+        # arrays lie as in .npy; the library takes their first axis for x
+        heights = _filled(stored) if key in _ARRAYS else _heights(stored)
+        steps = _steps(path, key, chosen)
+        pitch = None if steps is None or unit is None else (steps[0] * unit, steps[1] * unit)
+        form = ", ".join((BY_LIBRARY[key], *_direction(chosen)))
+    reader = library_version(_LIBRARY)
+    return Scan(
+        heights,
+        unit,
+        pitch,
+        None,
+        names[index],
+        tuple(names),
+        form,
+        reader,
+        steps=steps if pitch is None else None,
+    )
 
-        with open_topography(str(path), format=key) as opened:
-            candidates = [(c, unit) for c in opened.channels if (unit := _height_unit(c)) is not None]
-            names = unique_names([str(c.name) for c, _ in candidates])
-            index = pick_channel(path.name, names, channel)
-            chosen, unit = candidates[index]
-            check_shape(path.name, chosen.nb_grid_pts[::-1])
-            heights = _heights(chosen.topography().heights())
-            pitch = _pitch(chosen, unit)
-    return Scan(heights, unit, pitch, None, names[index], tuple(names), FORMATS[key], library_version(_LIBRARY))
+
+def _channels(path: Path, key: str) -> Sequence[Any]:
+    """Lists the channels of a file. Where the library refuses a Nanoscope file, each image is tried alone."""
+    from SurfaceTopography.Exceptions import CorruptFile, UnsupportedFormatFeature
+    from SurfaceTopography.IO import open_topography
+
+    try:
+        found: Sequence[Any] = open_topography(_source(path, key), format=key).channels
+    except CorruptFile:
+        raise
+    except UnsupportedFormatFeature as error:
+        raise fault(path.name, f"{BY_LIBRARY[key]} data with an image", one_line(str(error)), EXPORT) from None
+    except Exception:
+        if key != "di":
+            raise
+        alone = [_alone(version) for version in nanoscope.one_image_each(path)]
+        found = [channel for channels in alone for channel in channels]
+        if not found:
+            raise
+    return found
+
+
+def _source(path: Path, key: str) -> str | Callable[[], BytesIO]:
+    """Returns what the library opens. It knows .sdf by the name of the ISO, and not by the older one of the BCR."""
+    if key != "sdf":
+        return str(path)
+    data = path.read_bytes()
+    data = data[:1] + b"ISO" + data[4:]
+    return lambda: BytesIO(data)
+
+
+def _alone(data: bytes) -> Sequence[Any]:
+    from SurfaceTopography.IO import open_topography
+
+    try:
+        found: Sequence[Any] = open_topography(lambda: BytesIO(data), format="di").channels
+    except Exception:
+        return []
+    return found
+
+
+@contextmanager
+def _without_dates() -> Iterator[None]:
+    """Keeps the library from reading dates, which are not used here, and which fail in other languages."""
+    import dateutil.parser
+    from SurfaceTopography.IO import expr
+
+    def no_date(*_arguments: object, **_keywords: object) -> datetime:
+        return datetime(1970, 1, 1)
+
+    with (
+        patch.object(dateutil.parser, "parse", no_date),
+        patch.dict(expr._FUNCTIONS, parse_datetime=no_date, make_datetime=no_date, from_timestamp=no_date),
+    ):
+        yield
+
+
+def _clean(name: object) -> str:
+    """Cuts a channel's name at its NUL, behind which some programs leave bytes of longer names."""
+    return str(name).split("\0")[0].strip()
+
+
+def _names(channels: Sequence[Any], plain: Sequence[str]) -> list[str]:
+    """Names the channels: of several with one name, those that are no trace of the main scan say what they are."""
+    told = []
+    for name, channel in zip(plain, channels, strict=True):
+        words = [word for word in _direction(channel) if word != "trace"] if plain.count(name) > 1 else []
+        told.append(" ".join([name, *words]))
+    return unique_names(told)
+
+
+def _direction(channel: Any) -> tuple[str, ...]:
+    return nanoscope.direction(_notes(channel))
+
+
+def _notes(channel: Any) -> dict[str, Any]:
+    """Returns the channel's entries of the header; keys of Nanoscope files are in lower case."""
+    notes = channel.info.get("raw_metadata", {})
+    return notes if isinstance(notes, dict) else {}
 
 
 def _height_unit(channel: Any) -> float | None:
@@ -71,20 +173,25 @@ def _heights(stored: Any) -> NDArray[np.float64]:
     preview inside a Park file (heights().T), and with another program's reading of a Nanoscope file, which stores the
     bottom line first (heights().T[::-1]).
     """
-    filled = np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan)
-    return np.ascontiguousarray(filled.T[::-1])
+    return np.ascontiguousarray(_filled(stored).T[::-1])
 
 
-def _pitch(channel: Any, um_per_unit: float) -> tuple[float, float]:
-    """Computes the pitch along (x, y), um: size of the field over number of samples."""
-    notes = channel.info.get("raw_metadata", {})
-    px, py = (
-        _field(size, n, notes.get(note)) * um_per_unit / n
-        for size, n, note in zip(
-            channel.physical_sizes, channel.nb_grid_pts, ("FastScanSize", "SlowScanSize"), strict=True
-        )
-    )
-    return px, py
+def _filled(stored: Any) -> NDArray[np.float64]:
+    """Fills the samples that the library masks with NaN."""
+    return np.ascontiguousarray(np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan))
+
+
+def _steps(path: Path, key: str, channel: Any) -> tuple[float, float] | None:
+    """Computes the sample distance along (x, y) in the channel's unit: size of the field over number of samples."""
+    if channel.physical_sizes is None:
+        return None
+    notes = _notes(channel)
+    nx, ny = (int(n) for n in channel.nb_grid_pts)
+    size_x, size_y = (float(size) for size in channel.physical_sizes)
+    size_x, size_y = _field(size_x, nx, notes.get("FastScanSize")), _field(size_y, ny, notes.get("SlowScanSize"))
+    if key == "di":
+        size_y = nanoscope.slow_size((size_x, size_y), (nx, ny), notes, nanoscope.scan_list(path))
+    return size_x / nx, size_y / ny
 
 
 def _field(size: float, n: int, scan_size: str | None) -> float:

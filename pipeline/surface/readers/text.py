@@ -2,7 +2,7 @@
 
 import codecs
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,61 +16,99 @@ from pipeline.surface.readers.common import (
     micrometres,
     one_line,
     pick_channel,
-    third_party,
 )
+from pipeline.surface.readers.header import Header, may_state_scale, understand
 from pipeline.surface.scan import Scan
 
-_NUMBER = re.compile(r"[-+]?(\d|\.\d|nan\b|inf)", re.IGNORECASE)
-_QUANTITY = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)")
-_KEY_VALUE = re.compile(r"([^:=]+)[:=](.*)")
-_PIXEL_UNITS = ("", "px", "pixel", "pixels")
-
-# header keys, lower case: Gwyddion's ASCII export, and the export with 'Real Width' and 'Image Width'
-_WIDTH = ("width", "real width")
-_HEIGHT = ("height", "real height")
-_COLUMNS = ("image width",)
-_ROWS = ("image height",)
-_VALUE_UNIT = ("value units", "z unit")
-_NAME = ("channel", "name")
+_NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
+# rows with nothing but these need no look at each cell, unless a sign stands alone
+_PLAIN = frozenset("0123456789.,;eE+- \t\r")
+_LONE_SIGN = re.compile(r"[-+](?:[^\d.,]|$)")
+_EXCEL_ERROR = re.compile(r"#(?:n/a|num!|value!|div/0!|ref!|name\?|null!)", re.IGNORECASE)
+_VOID = re.compile(
+    r"|[-+]?nan(?:\(\w*\))?|-?1\.#\w+|bad|void|null|none|nil|masked|invalid|n/?a|#n/?a|#\w+[!?/]\w*!?|-+|–|—|\*+|\?+|_+",
+    re.IGNORECASE,
+)
+_INFINITY = re.compile(r"[-+]?inf(?:inity)?", re.IGNORECASE)
+_COMMENT = ("#", "%", "//", "!")
+_REMOVE = "remove that line, or begin it with '#'"
+# lines that may state a unit are read behind a '#', and lost where they are removed
+_MARK = "begin it with '#' if it is no row of heights"
+_WRITE_NAN = "write NaN for a sample that was not measured: a row that is removed shifts the rest"
+_CUT = "the file may be cut short: copy or export it again"
+# Nanoscope's text export has one line such as "Height(nm)"
+_QUANTITY_NAME = re.compile(r"[\"']?([A-Za-z][\w ]*?)\s*[(\[]\s*([^)\]\d]{1,3})\s*[)\]][\"']?")
+_AXIS_NAME = re.compile(r"\W*([xyz])\b[^(\[]*(?:[(\[]\s*([^)\]]*)\s*[)\]])?\W*", re.IGNORECASE)
+# largest deviation of evenly spaced axis labels from their mean step
+_EVEN = 1e-3
 
 
 @dataclass(frozen=True)
-class _Lines:
-    """The header of a text file, by key in lower case, and its rows of numbers as text."""
+class _Content:
+    """A text file's header lines, the names above its columns, and its rows of numbers with their line numbers."""
 
-    header: dict[str, str]
+    header: list[str]
+    names: list[str]
     rows: list[str]
-
-    def first(self, keys: tuple[str, ...]) -> str | None:
-        """Returns the value of the first of these keys that the header has."""
-        return next((self.header[key] for key in keys if key in self.header), None)
+    numbers: list[int]
+    separator: str | None
+    decimal_comma: bool
 
 
 def read(path: Path, channel: str | None) -> Scan:
-    """Reads a matrix, a flat list with the image's width and height in the header, or complete x y z triples.
+    """Reads a matrix, a flat list with the image's width and height in the header, or x y z triples.
 
-    Matrices and lists are flipped, because their first row is the top. Raises InputError for anything but numbers,
-    for rows of different lengths, and for a single column or row without a width.
+    Matrices and lists are flipped, because their first row is the top. NaN, Bad, ---, empty cells and the like are
+    holes. Raises InputError for anything but numbers, for rows of different lengths, and for a single column or row
+    without a width.
     """
-    lines = _split(path, _decode(path.read_bytes()))
-    separator, rows = _separated(path, lines.rows)
-    with third_party(path.name, "rows of equally many numbers", "numpy"):
-        table = np.loadtxt(rows, dtype=np.float64, delimiter=separator, comments=None, ndmin=2)
-    if table.shape[1] == 3 and table.shape[0] > 3:
-        heights = xyz.heights(path.name, table)
+    content = _split(path, _decode(path))
+    table = _table(path, content)
+    table, steps, labels = _without_labels(content, table)
+    triples = table.shape[1] == 3 and table.shape[0] > 3
+    header = understand(path.name, content.header, triples)
+    if header.no_data is not None:
+        table[table == header.no_data] = np.nan
+    form = f"text with a header{labels}" if content.header or content.names else f"text{labels}"
+    if triples:
+        header = _with_names(header, content.names)
+        # Gwyddion separates by tabs
+        grid = xyz.grid(path.name, table, header.gwyddion_triples or content.separator == "\t")
+        heights, header = grid.heights, replace(header, steps=grid.steps)
+        form += ", x y z triples with y " + ("downwards, as Gwyddion writes them" if grid.y_down else "upwards")
     else:
-        heights = np.ascontiguousarray(_matrix(path, lines, table)[::-1])
+        heights = np.ascontiguousarray(_matrix(path, header, table)[::-1])
+        header = replace(header, steps=header.steps or steps)
     check_shape(path.name, heights.shape)
-    name = lines.first(_NAME) or "data"
-    pick_channel(path.name, [name], channel)
-    form = "text with a header" if lines.header else "text"
-    unit, pitch = _value_unit(path, lines), _pitch(path, lines, heights.shape)
-    return Scan(heights, unit, pitch, None, name, (name,), form, library_version("numpy"))
+    name = header.channel or "data"
+    pick_channel(path.name, [name], channel, sole=True)
+    pitch, relative = _pitch(header, heights.shape, triples)
+    return Scan(
+        heights,
+        header.um_per_unit,
+        pitch,
+        None,
+        name,
+        (name,),
+        form,
+        library_version("numpy"),
+        steps=relative,
+        unread=header.unread,
+    )
 
 
-def _decode(data: bytes) -> str:
+# --- bytes and lines ---------------------------------------------------------------------------------
+
+
+def _decode(path: Path) -> str:
+    data = path.read_bytes()
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", errors="replace")
+    if (encoding := utf16_without_mark(data[:4096])) is not None:
+        return data.decode(encoding, errors="replace")
+    if b"\0" in data:
+        found = f"binary data behind a text header ({one_line(data[:40].decode('latin-1').split(chr(0))[0], 40)!r})"
+        raise fault(path.name, "a text file of numbers", found, "export the height channel as .npy, text or .gwy")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -78,39 +116,100 @@ def _decode(data: bytes) -> str:
         return data.decode("latin-1")
 
 
-def _split(path: Path, content: str) -> _Lines:
-    header: dict[str, str] = {}
-    rows: list[str] = []
-    for number, line in enumerate(content.splitlines(), start=1):
+def utf16_without_mark(head: bytes) -> str | None:
+    """Returns the encoding of UTF-16 text that lacks a byte order mark; None for anything else."""
+    for encoding, high in (("utf-16-le", head[1::2]), ("utf-16-be", head[::2])):
+        low = head[::2] if encoding == "utf-16-le" else head[1::2]
+        if len(head) >= 16 and high.count(0) > 0.9 * len(high) and 0 not in low:
+            return encoding
+    return None
+
+
+def _split(path: Path, content: str) -> _Content:
+    """Separates the header from the rows of numbers. Raises InputError for a line that is neither."""
+    lines = content.splitlines()
+    separator, decimal_comma = _separator(path, lines)
+    usual = _typical_row(lines).count("\t")
+    found = _Content([], [], [], [], separator, decimal_comma)
+    for number, line in enumerate(lines, start=1):
         stripped = line.strip()
         if not stripped:
+            # a row of nothing but separators is a row that was not measured
+            if separator == "\t" and line.count("\t") == usual:
+                found.rows.append(line)
+                found.numbers.append(number)
             continue
-        if _NUMBER.match(stripped):
-            rows.append(stripped.rstrip(",;"))
+        if stripped.startswith(_COMMENT) and not _EXCEL_ERROR.match(stripped):
+            if not found.rows:
+                found.header.append(line)
             continue
-        entry = _KEY_VALUE.match(stripped.lstrip("# "))
-        if not stripped.startswith("#") and (rows or entry is None):
-            found = f"{one_line(stripped, 40)!r} in line {number}"
-            raise fault(path.name, "numbers", found, "remove that line, or begin it with '#'")
-        if entry is not None:
-            header.setdefault(entry[1].strip().lower(), entry[2].strip())
-    if not rows:
+        if _is_plain(stripped) or _is_row(line, separator, bool(found.rows)):
+            found.rows.append(line)
+            found.numbers.append(number)
+        else:
+            _take_header_line(path, found, line, number)
+    if not found.rows:
         raise fault(path.name, "a matrix of heights", "no numbers", "export the height data again")
-    return _Lines(header, rows)
+    return found
 
 
-def _separated(path: Path, rows: list[str]) -> tuple[str | None, list[str]]:
-    """Returns the separator of the numbers (None: white space), and the rows with decimal points."""
-    separator, decimal_comma = _separator(path, rows[0])
-    return separator, [row.replace(",", ".") for row in rows] if decimal_comma else rows
+def _take_header_line(path: Path, content: _Content, line: str, number: int) -> None:
+    """Adds a line above the numbers to the header or to the names of columns; refuses any other line."""
+    stripped = line.strip()
+    cells = _cells(line, content.separator)
+    odd = [(i, cell) for i, cell in enumerate(cells, start=1) if not _is_cell(cell)]
+    if content.rows:
+        if len(odd) == len(cells) or len(cells) == 1:
+            raise fault(path.name, "numbers", f"{one_line(stripped, 40)!r} in line {number}", _REMOVE)
+        column, cell = odd[0]
+        found = f"{one_line(cell, 40)!r} in column {column} of line {number}"
+        raise fault(path.name, "numbers", found, _WRITE_NAN)
+    if re.match(r"[^:=]+[:=]", stripped) or re.fullmatch(r"[A-Za-z_]+\s+[-+.\deE]+", stripped):
+        content.header.append(line)
+    elif _is_entry(filled := [cell for cell in cells if cell]):
+        content.header.append(f"{filled[0]}: {filled[1]}")
+    elif match := _QUANTITY_NAME.fullmatch(stripped):
+        content.header.extend((f"Channel: {match[1]}", f"Value units: {match[2]}"))
+    elif _names_columns(cells, content.separator):
+        content.names[:] = cells
+    elif re.fullmatch(r"\W+|\[[^\]]*\]", stripped):
+        return
+    else:
+        way_out = _MARK if re.search(r"\d", stripped) or may_state_scale(stripped) else _REMOVE
+        raise fault(path.name, "numbers", f"{one_line(stripped, 40)!r} in line {number}", way_out)
 
 
-def _separator(path: Path, row: str) -> tuple[str | None, bool]:
-    """Returns the separator of a row's numbers (None: white space), and whether a comma is the decimal point."""
+def _is_entry(cells: list[str]) -> bool:
+    """Says whether a line above the numbers is a key and its value in two cells."""
+    if len(cells) != 2 or _is_cell(cells[0]):
+        return False
+    return re.match(_NUMBER, cells[1]) is not None or micrometres(cells[1]) is not None
+
+
+def _names_columns(cells: list[str], separator: str | None) -> bool:
+    """Says whether a line names columns: several words between separators, or x y z."""
+    if len(cells) < 2 or any(_NUMBER.fullmatch(cell) for cell in cells):
+        return False
+    return separator is not None or [cell[0].casefold() for cell in cells if cell[:1].isalpha()][:3] == [
+        "x",
+        "y",
+        "z",
+    ]
+
+
+# --- cells -------------------------------------------------------------------------------------------
+
+
+def _separator(path: Path, lines: list[str]) -> tuple[str | None, bool]:
+    """Returns what separates the numbers (None: white space), and whether a comma is the decimal point."""
+    row = _typical_row(lines)
     if ";" in row:
         return ";", True
     if "\t" in row:
-        return None, True
+        # a tab that only indents, or follows a row, separates nothing
+        inner = row.strip().split("\t")
+        blanks = any(len(cell.split()) > 1 for cell in inner)
+        return (None, True) if blanks or len(inner) == 1 else ("\t", True)
     if "," not in row:
         return None, False
     if re.search(r"\d,\d", row) and re.search(r"\d\s+[-+.\d]", row):
@@ -120,10 +219,158 @@ def _separator(path: Path, row: str) -> tuple[str | None, bool]:
     return ",", False
 
 
-def _matrix(path: Path, lines: _Lines, table: NDArray[np.float64]) -> NDArray[np.float64]:
+def _typical_row(lines: list[str]) -> str:
+    """Returns the line with the most numbers among the first and the middle rows."""
+    middle = len(lines) // 2
+    looked_at = [*lines[:100], *lines[middle : middle + 20]]
+    plain = [line for line in looked_at if not line.lstrip().startswith(_COMMENT)]
+    return max(plain, key=lambda line: len(re.findall(r"(?<![\w.])[-+]?[\d.]", line)), default="")
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    cells = line.split() if separator is None else line.strip("\r\n").split(separator)
+    return [cell.strip().strip("\"'").strip() for cell in cells]
+
+
+def _is_plain(row: str) -> bool:
+    return _PLAIN.issuperset(row) and re.search(r"\d", row) is not None and _LONE_SIGN.search(row) is None
+
+
+def _has_empty_cell(row: str, separator: str | None) -> bool:
+    if separator is None:
+        return False
+    row = row.strip(" \r\n")
+    return (
+        row.startswith(separator)
+        or row.endswith(separator)
+        or re.search(rf"{separator} *{separator}", row) is not None
+    )
+
+
+def _is_cell(cell: str) -> bool:
+    return any(form.fullmatch(cell) for form in (_NUMBER, _VOID, _INFINITY))
+
+
+def _is_row(line: str, separator: str | None, below_rows: bool) -> bool:
+    """Says whether all cells are numbers or marks of a missing one, with at least one number above the first row."""
+    cells = _cells(line, separator)
+    if not all(_is_cell(cell) for cell in cells):
+        return False
+    if any(_NUMBER.fullmatch(cell) for cell in cells):
+        return True
+    return len(cells) > 1 and (below_rows or any(re.search(r"\w", cell) for cell in cells))
+
+
+def _table(path: Path, content: _Content) -> NDArray[np.float64]:
+    """Converts the rows to numbers (rows, columns), NaN for marks of missing ones."""
+    rows, separator = content.rows, content.separator
+    if separator is not None:
+        rows = _without_outer_separators(rows, separator)
+    rows = [
+        row if _is_plain(row) and not _has_empty_cell(row, separator) else _with_nan(row, separator) for row in rows
+    ]
+    if content.decimal_comma:
+        rows = [row.replace(",", ".") for row in rows]
+    try:
+        table = np.loadtxt(rows, dtype=np.float64, delimiter=separator, comments=None, ndmin=2)
+    except ValueError as error:
+        raise _uneven(path, content, rows, str(error)) from None
+    return table
+
+
+def _without_outer_separators(rows: list[str], separator: str) -> list[str]:
+    """Removes the separator that every row begins or ends with; a single row's is an empty cell."""
+    rows = [row.strip(" \r\n") for row in rows]
+    if all(row.endswith(separator) for row in rows):
+        rows = [row[:-1] for row in rows]
+    if all(row.startswith(separator) for row in rows):
+        rows = [row[1:] for row in rows]
+    return rows
+
+
+def _with_nan(row: str, separator: str | None) -> str:
+    cells = ["nan" if _VOID.fullmatch(cell) else re.sub("[dD]", "e", cell) for cell in _cells(row, separator)]
+    return (separator or " ").join(cells)
+
+
+def _uneven(path: Path, content: _Content, rows: list[str], cause: str) -> Exception:
+    """Returns the error for rows that NumPy cannot read, which are mostly of different lengths."""
+    lengths = [len(_cells(row, content.separator)) for row in rows]
+    usual = max(set(lengths), key=lengths.count) if len(set(lengths)) > 1 else lengths[0]
+    odd = next((i for i, length in enumerate(lengths) if length != usual), None)
+    if odd is None:
+        return fault(path.name, "rows of numbers", one_line(cause, 80), _WRITE_NAN)
+    found = f"{lengths[odd]} in line {content.numbers[odd]} where others have {usual}"
+    way_out = {0: _MARK, len(rows) - 1: _CUT}.get(odd, _WRITE_NAN)
+    return fault(path.name, "rows of equally many numbers", f"{found} (the number of columns changed)", way_out)
+
+
+# --- labels of rows and columns ----------------------------------------------------------------------
+
+
+def _without_labels(
+    content: _Content, table: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[float, float] | None, str]:
+    """Removes an index row and column, or the axes x and y above and left of the heights.
+
+    Returns the heights, the steps of the axes in their unit (None for an index), and words on what was removed.
+    """
+    if min(table.shape) < 4:
+        return table, None, ""
+    row, column = table[0, 1:], table[1:, 0]
+    corner = bool(np.isnan(table[0, 0]))
+    if corner and _even(row) and _even(column):
+        heights = table[1:, 1:]
+        if _counts_up(row) and _counts_up(column):
+            return heights, None, ", without its index row and column"
+        return heights, (abs(float(row[1] - row[0])), abs(float(column[1] - column[0]))), ", without its axes"
+    cells = [_cells(line, content.separator)[0] for line in content.rows]
+    indexed = all(cell.isdecimal() for cell in cells) and _counts_up(table[:, 0])
+    others = table[:, 1:][np.isfinite(table[:, 1:])]
+    named = (bool(content.names) and content.names[0] == "") or len(content.names) == table.shape[1] - 1
+    if indexed and (named or bool((others != np.round(others)).any())):
+        return table[:, 1:], None, ", without its index column"
+    first = _cells(content.rows[0], content.separator)
+    below = table[1:][np.isfinite(table[1:])]
+    if all(cell.isdecimal() for cell in first) and _counts_up(table[0]) and bool((below != np.round(below)).any()):
+        return table[1:], None, ", without its index row"
+    return table, None, ""
+
+
+def _even(labels: NDArray[np.float64]) -> bool:
+    steps = np.diff(labels)
+    mean = float(steps.mean())
+    return bool(np.isfinite(labels).all()) and mean != 0 and bool((np.abs(steps - mean) <= _EVEN * abs(mean)).all())
+
+
+def _counts_up(labels: NDArray[np.float64]) -> bool:
+    return labels[0] in (0, 1) and bool((np.diff(labels) == 1).all())
+
+
+# --- shape and units ---------------------------------------------------------------------------------
+
+
+def _with_names(header: Header, names: list[str]) -> Header:
+    """Adds the units that the names of three columns state, as in 'X (um)', 'Y (um)', 'Z [nm]'."""
+    found = [_AXIS_NAME.fullmatch(name) for name in names]
+    if [match[1].casefold() if match else None for match in found] != ["x", "y", "z"]:
+        return header
+    units = [micrometres(match[2] or "") if match else None for match in found]
+    lateral = units[0] if units[0] == units[1] else None
+    return replace(
+        header,
+        um_per_unit=header.um_per_unit if header.um_per_unit is not None else units[2],
+        lateral_um=header.lateral_um if header.lateral_um is not None else lateral,
+    )
+
+
+def _matrix(path: Path, header: Header, table: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the numbers in the shape of the image, top row first."""
-    columns, rows = _count(lines, _COLUMNS), _count(lines, _ROWS)
+    columns, rows = header.columns, header.rows
     if columns is None or rows is None:
+        if table.shape[1] == 2:
+            found = f"two columns of {table.shape[0]} numbers, as of a profile"
+            raise fault(path.name, "a 2-D height map", found, "export the whole image")
         if 1 in table.shape:
             form = "row" if table.shape[0] == 1 else "column"
             raise fault(
@@ -139,35 +386,18 @@ def _matrix(path: Path, lines: _Lines, table: NDArray[np.float64]) -> NDArray[np
     return table.reshape(rows, columns)
 
 
-def _count(lines: _Lines, keys: tuple[str, ...]) -> int | None:
-    value = lines.first(keys)
-    return int(value) if value is not None and value.isdecimal() else None
-
-
-def _value_unit(path: Path, lines: _Lines) -> float | None:
-    unit = lines.first(_VALUE_UNIT)
-    if not unit:
-        return None
-    scale = micrometres(unit)
-    if scale is None:
-        raise fault(path.name, "heights in a unit of length", f"values in {unit!r}", "export the height channel")
-    return scale
-
-
-def _pitch(path: Path, lines: _Lines, shape: tuple[int, ...]) -> tuple[float, float] | None:
-    """Computes the pitch along (x, y), um, from the size of the field; None where the header does not state it."""
-    width, height = _length(path, lines, _WIDTH), _length(path, lines, _HEIGHT)
-    if width is None or height is None:
-        return None
-    return width / shape[1], height / shape[0]
-
-
-def _length(path: Path, lines: _Lines, keys: tuple[str, ...]) -> float | None:
-    value = lines.first(keys)
-    quantity = _QUANTITY.fullmatch(value) if value is not None else None
-    if quantity is None or quantity[2] in _PIXEL_UNITS:
-        return None
-    scale = micrometres(quantity[2])
-    if scale is None:
-        raise fault(path.name, "a field in a unit of length", f"'{keys[0]}: {value}'", "correct the header")
-    return float(quantity[1]) * scale
+def _pitch(
+    header: Header, shape: tuple[int, ...], triples: bool
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """Computes the pitch along (x, y), um, or else the steps in a unit that the file does not state."""
+    rows, columns = shape
+    if triples and header.steps is not None:
+        scale = header.lateral_um
+        return (None, header.steps) if scale is None else ((header.steps[0] * scale, header.steps[1] * scale), None)
+    if header.size_um is not None:
+        return (header.size_um[0] / columns, header.size_um[1] / rows), None
+    if header.pitch_um is not None:
+        return header.pitch_um, None
+    if header.size is not None and header.size != (columns, rows):
+        return None, (header.size[0] / columns, header.size[1] / rows)
+    return None, header.steps
