@@ -77,9 +77,9 @@ class TaylorStudy:
         self._stack, self._layout, self._chosen, self._views = stack, layout, chosen, views
         self._config = views.config
 
-    def curves(self, has_steps: bool) -> Study:
-        """Returns one function per setting, which computes its curve; has_steps: False for a laser line."""
-        return [self.terms, *([self.step] if has_steps else []), self.grid, self.exponent]
+    def curves(self) -> Study:
+        """Returns one function per setting, which computes its curve; a laser line has no wavelength step."""
+        return [self.terms, *([] if self._config.light.is_line else [self.step]), self.grid, self.exponent]
 
     def terms(self) -> Curve:
         """Computes the error against the order N of the series."""
@@ -149,9 +149,9 @@ class PolarStudy:
         self._chosen = views.error(chosen)
         self._rules = self._bake.rules(planned.rings.rho())
 
-    def curves(self, has_steps: bool) -> Study:
-        """Returns one function per setting, which computes its curve; has_steps: False for a laser line."""
-        return [self.rings, self.azimuths, self.w_terms, *([self.step] if has_steps else [])]
+    def curves(self) -> Study:
+        """Returns one function per setting, which computes its curve; a laser line has no wavelength step."""
+        return [self.rings, self.azimuths, self.w_terms, *([] if self._config.light.is_line else [self.step])]
 
     def rings(self) -> Curve:
         """Computes the error against the number of rings."""

@@ -19,7 +19,8 @@ class Layout:
     """The stages of a layout, and the functions that the other stages need of it.
 
     transform: the stage that transforms the surface. table: the stage that integrates the transform to a table.
-    load: reads the table of an artifact. size: describes the table's size, for a plan.
+    load: reads the table of an artifact. table_of: returns the table of a stage's inputs, from memory if it is there.
+    size: describes the size of the table, for a plan.
     study: returns the curves of error against each setting that `validate` shows, from config, inputs, the table's
         evaluator and the map on which errors are measured. study_remark: a sentence on them for the report.
     settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
@@ -29,6 +30,7 @@ class Layout:
     transform: Stage
     table: Stage
     load: Callable[[Artifact], Table]
+    table_of: Callable[[Inputs], Table]
     size: Callable[[Config], str]
     study: Callable[[Config, Inputs, Evaluator, CoarseMap], Study]
     study_remark: str

@@ -41,7 +41,7 @@ def map_radius(config: Config) -> float:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    evaluate = table_evaluator(layouts.of(config.table).load(inputs["table"]), config.radiometry)
+    evaluate = table_evaluator(layouts.of(config.table).table_of(inputs), config.radiometry)
     views, unit = Map(config.render.size, map_radius(config)), config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):

@@ -48,7 +48,7 @@ def _measured(
     """Computes the numbers of the summary; returns them and the pictures by name, drawn by the executor."""
     field, layout = surface.of(inputs), layouts.of(config.table)
     drawn = {"surface": drawing.submit(_picture, "height_map", field)}
-    evaluate = table_evaluator(layout.load(inputs["table"]), config.radiometry)
+    evaluate = table_evaluator(layout.table_of(inputs), config.radiometry)
     reference = surface.reference_of(config, inputs, progress)
     radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
     first = render.light_direction(config.render.lights[0])

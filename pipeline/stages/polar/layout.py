@@ -26,8 +26,7 @@ def _size(config: Config) -> str:
 def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
     """Returns the curves of error against rings, azimuths, terms in |w| and wavelength step."""
     layout, planned = power_spectrum.layout_of(config), power_spectrum.planned(inputs["power_spectrum"])
-    has_steps = inputs.summary("table")["wavelengths"] > 1
-    return PolarStudy(power_spectrum.of(inputs), planned, layout, evaluate, coarse).curves(has_steps)
+    return PolarStudy(power_spectrum.of(inputs), planned, layout, evaluate, coarse).curves()
 
 
 def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
@@ -57,7 +56,7 @@ def _prepare(config: Config, inputs: Inputs) -> "Prepared":
 
     return polar.prepare(
         config,
-        table.load(inputs["table"]),
+        table.of(inputs),
         lambda: surface.reference_of(config, inputs, silent),
         {key: inputs.summary("power_spectrum").get(key) for key in _PLANNED},
         inputs.summary("table")["certificate"],
@@ -68,6 +67,7 @@ LAYOUT = Layout(
     transform=power_spectrum.POWER_SPECTRUM,
     table=table.TABLE,
     load=table.load,
+    table_of=table.of,
     size=_size,
     study=_study,
     study_remark="Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked.",

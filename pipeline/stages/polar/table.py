@@ -58,6 +58,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "channels": ["X", "Y", "Z"],
         },
     )
+    inputs.session.keep("table", table)
     return {
         "layout": "polar",
         "rings": asdict(table.grid.rings),
@@ -70,6 +71,11 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "certificate": asdict(certified),
         "spectral_error": None if spectral is None else asdict(spectral),
     }
+
+
+def of(inputs: Inputs) -> polar.PolarTable:
+    """Returns the table of a stage's inputs."""
+    return inputs.session.get("table", lambda: load(inputs["table"]))
 
 
 def load(artifact: Artifact) -> polar.PolarTable:

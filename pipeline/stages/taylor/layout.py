@@ -22,8 +22,7 @@ def _size(config: Config) -> str:
 
 def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
     """Returns the curves of error against terms, wavelength step, resolution and exponent of the grid."""
-    has_steps = inputs.summary("table")["wavelengths"] > 1
-    return TaylorStudy(stack.of(inputs), stack.layout_of(config), evaluate, coarse).curves(has_steps)
+    return TaylorStudy(stack.of(inputs), stack.layout_of(config), evaluate, coarse).curves()
 
 
 def _settings(stack: Summary, table: Summary) -> list[list[str]]:
@@ -48,7 +47,7 @@ def _prepare(config: Config, inputs: Inputs) -> "Prepared":
 
     return taylor.prepare(
         config,
-        table.load(inputs["table"]),
+        table.of(inputs),
         {key: inputs.summary("stack").get(key) for key in _PREDICTED},
         inputs.summary("table")["certificate"],
     )
@@ -58,6 +57,7 @@ LAYOUT = Layout(
     transform=stack.STACK,
     table=table.TABLE,
     load=table.load,
+    table_of=table.of,
     size=_size,
     study=_study,
     study_remark="Terms and step are varied at the directions of the map itself, without a grid.",

@@ -53,6 +53,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     inside = np.hypot(nodes[:, None], nodes) <= grid.U_MAX
     evaluate = table_evaluator(table, config.radiometry)
     certified = certificate.measure(evaluate, surface.reference_of(config, inputs, progress), config, progress)
+    inputs.session.keep("table", table)
     return {
         "layout": "taylor",
         "resolution": table.resolution,
@@ -63,6 +64,11 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "skipped_share": float(1.0 - np.mean(table.computed[inside])),
         "certificate": asdict(certified),
     }
+
+
+def of(inputs: Inputs) -> taylor.TaylorTable:
+    """Returns the table of a stage's inputs."""
+    return inputs.session.get("table", lambda: load(inputs["table"]))
 
 
 def load(artifact: Artifact) -> taylor.TaylorTable:

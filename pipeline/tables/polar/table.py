@@ -38,6 +38,11 @@ class PolarTable:
     grid: PolarGrid
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of the coefficients."""
+        return self.values.nbytes
+
+    @property
     def w_terms(self) -> int:
         """Number of Chebyshev terms in |w|."""
         return int(self.values.shape[2])

@@ -37,6 +37,11 @@ class TaylorTable:
     power: float
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays."""
+        return self.values.nbytes + self.computed.nbytes + self.unknown.nbytes
+
+    @property
     def resolution(self) -> int:
         """Number of nodes along each axis."""
         return int(self.values.shape[0])
