@@ -9,11 +9,10 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
-from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import maps, planes
-from pipeline.evaluation.figures.page import Bench, BenchSurface, Column, Page, PageTable, Picture
+from pipeline.evaluation.figures.page import Bench, BenchSurface, Page, PageText, Picture
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
-from pipeline.evaluation.plots.charts import Chart, Series, charts
+from pipeline.evaluation.plots.charts import Series, charts
 from pipeline.evaluation.plots.palette import BLUE, VERMILION
 from pipeline.optics import geometry
 from pipeline.optics.coherence import sigma_f
@@ -33,12 +32,6 @@ _LINE_SAMPLES, _LINE_WIDTHS = 401, 4.0
 # the part of the first order that the second does not overlap and the eye sees well
 _FIRST_ORDER_NM = (450.0, 680.0)
 _AXIS_SAMPLES = 116
-_SAME_WIDTH = 0.01
-_WHY_ROOT_TWO = (
-    "A periodic surface has P(f) = sum_m c_m exp(-(f - m / d)^2 / (2 sigma_f^2)), the window's transform about every "
-    "order ([D14] eq. 8). The square of its modulus narrows that by sqrt(2). In wavelength the line of an order at "
-    "sin theta is sigma_f lambda^2 / (sqrt(2) sin theta) wide, which limits the purity of its colour."
-)
 
 
 @dataclass(frozen=True)
@@ -55,22 +48,24 @@ class _Window:
     purity: float
     xyz: Array
 
+    def row(self, period_um: float) -> tuple[float, ...]:
+        """Return its numbers for the page's table."""
+        mixed_nm = self.width_per_um * _LINE_NM * period_um
+        periods = _WINDOW_SIGMAS * self.sigma_um / period_um
+        return self.sigma_um, periods, self.expected_per_um, self.width_per_um, mixed_nm, self.purity
+
 
 def make(bench: Bench, progress: Progress) -> Page:
     """Make the page: the first order's line and colours for windows from 4 periods to 52."""
     views, recipe = maps.views_of(bench), maps.blazed_recipe(bench)
     found = [_measure(bench.blazed, recipe, sigma_um, views, progress) for sigma_um in _SIGMAS_UM]
-    return Page(
-        name="coherence_length",
-        title="The coherence length",
-        source="[D14] fig. 16, [S14] fig. 2.10",
-        expected="The shorter the coherence length, the fewer periods interfere: lines of each wavelength grow wide "
-        "and overlap in poorly resolved colours. Closed form: |P|^2 of an order is a Gaussian in u / lambda with a "
-        "standard deviation of sigma_f / sqrt(2), sigma_f = 1 / (2 pi sigma).",
-        checks=_checks(found),
-        tables=[_table(found, recipe)],
-        pictures=_pictures(views, found),
-        remarks=[_WHY_ROOT_TWO],
+    text = PageText("coherence_length", line_nm=_LINE_NM)
+    off = max(abs(each.width_per_um / each.expected_per_um - 1.0) for each in found)
+    growth = np.diff([each.purity for each in found])
+    return text.page(
+        checks=[text.check("line.width", off), text.check("colour.purity", growth.min())],
+        tables=[text.table("windows", [each.row(recipe.period_um) for each in found])],
+        pictures=_pictures(text, views, found),
     )
 
 
@@ -109,75 +104,17 @@ def _purity(exact: Reference, config: Config, period_um: float) -> float:
     return float(np.mean(colour.excitation_purity(colour.XYZ_to_xy(xyz), white)))
 
 
-def _checks(found: Sequence[_Window]) -> list[Check]:
-    off = max(abs(each.width_per_um / each.expected_per_um - 1.0) for each in found)
-    growth = np.diff([each.purity for each in found])
-    return [
-        Check(
-            "line.width",
-            f"the first order's line at {_LINE_NM:g} nm: relative error of its standard deviation, every window",
-            off,
-            "<",
-            _SAME_WIDTH,
-            source="σ_f / √2",
-        ),
-        Check("colour.purity", "least growth of the colours' purity from window to window", growth.min(), ">=", 0.0),
-    ]
-
-
-def _table(found: Sequence[_Window], recipe: Blazed) -> PageTable:
-    return PageTable(
-        "windows",
-        "Line and colour of the blazed first order by coherence length",
-        [
-            Column("σ (µm)", "{:g}"),
-            Column("periods in 4 sigma", "{:.0f}"),
-            Column("σ_f / √2 (1/µm)", "{:.5f}"),
-            Column("measured (1/µm)", "{:.5f}"),
-            Column("wavelengths mixed at 550 nm (nm)", "{:.1f}"),
-            Column("purity", "{:.3f}"),
-        ],
-        [
-            (
-                each.sigma_um,
-                _WINDOW_SIGMAS * each.sigma_um / recipe.period_um,
-                each.expected_per_um,
-                each.width_per_um,
-                each.width_per_um * _LINE_NM * recipe.period_um,
-                each.purity,
-            )
-            for each in found
-        ],
-    )
-
-
-def _pictures(views: Map, found: Sequence[_Window]) -> list[Picture]:
+def _pictures(text: PageText, views: Map, found: Sequence[_Window]) -> list[Picture]:
     panels = [
         maps.panel(views, each.xyz, f"σ = {each.sigma_um:g} µm", f"colour purity {each.purity:.2f}") for each in found
     ]
     sigmas = [each.sigma_um for each in found]
-    width = Chart(
-        f"Line of the first order at {_LINE_NM:g} nm",
-        "σ (µm)",
-        "standard deviation (1/µm)",
-        [
-            Series("σ_f / √2", sigmas, [each.expected_per_um for each in found], VERMILION, "-"),
-            Series("measured", sigmas, [each.width_per_um for each in found], BLUE, "o"),
-        ],
-        x_scale="log",
-    )
-    purity = Chart(
-        "Colours of the first order",
-        "σ (µm)",
-        "mean excitation purity",
-        [Series("measured", sigmas, [each.purity for each in found], BLUE)],
-        x_scale="log",
-        y_scale="linear",
-    )
+    widths = [
+        Series("σ_f / √2", sigmas, [each.expected_per_um for each in found], VERMILION, "-"),
+        Series("measured", sigmas, [each.width_per_um for each in found], BLUE, "o"),
+    ]
+    purities = [Series("measured", sigmas, [each.purity for each in found], BLUE)]
     return [
-        Picture(
-            maps.sheet([panels], "Blazed grating by coherence length, normal incidence"),
-            "Maps by coherence length: short windows smear every wavelength's line.",
-        ),
-        Picture(charts([[width, purity]]), "Width of a line and purity of the colours by coherence length."),
+        text.picture("maps", maps.sheet([panels], "Blazed grating by coherence length, normal incidence")),
+        text.picture("curves", charts([[text.chart("width", widths), text.chart("purity", purities)]])),
     ]

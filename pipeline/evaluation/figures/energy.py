@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from math import pi
-from typing import Any
 
 import numpy as np
 
@@ -11,10 +10,10 @@ from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import planes
 from pipeline.evaluation.figures.order_efficiencies import LAMBDA_MIN_NM, PERIOD_UM, KnownGrating, known_gratings
-from pipeline.evaluation.figures.page import Bench, BenchSurface, Column, Page, PageTable, Picture, numbers
+from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageTable, PageText, numbers
 from pipeline.evaluation.methods.catalogue import EXACT, METHODS, OURS
 from pipeline.evaluation.methods.method import Method
-from pipeline.evaluation.plots.charts import Chart, Series, charts
+from pipeline.evaluation.plots.charts import Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
 from pipeline.optics import geometry, gratings
 from pipeline.optics.coherence import sigma_f
@@ -29,12 +28,8 @@ LOSSLESS = Material(fresnel="none", shadowing=False, normalisation="absolute")
 _LINE = Light(illuminant=LaserLine(lambda_nm=LAMBDA_NM))
 # of views, in widths of an order's lobe on the unit disc: sums of Gaussians so far apart err by 2 exp(-pi^2 / 0.9^2)
 _VIEW_SPACING = 0.9
-# the change of G / w^2 across a lobe of the window's width, towards grazing angles
-_MIRROR_TOLERANCE, _LOBE_TOLERANCE = 1e-3, 5e-3
+_MIRROR_TOLERANCE = 1e-3
 _REACH = 6.0  # lobe widths around the mirror direction
-_PARSEVAL = 1e-9
-# G / w^2 and the sums over terms see light and view in another order
-_RECIPROCITY = 1e-10
 _PAIRS, _FEWER_PAIRS = 400, 60
 _MIRROR_DEG, _JUDGED_MIRROR = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0), 60.0
 # angles at which no order of the gratings lies within its lobe of the horizon, where half of it is seen
@@ -44,19 +39,6 @@ _MATERIALS = {
     "schlick": ("Schlick, n = 1.5, shadowing", Material()),
     "gold": ("gold, absolute", Material(fresnel="conductor", shadowing=False, normalisation="absolute")),
 }
-_REMARKS = (
-    (
-        "Where it loses: orders below the horizon keep their share of Σ|c_m|², which a real surface would give "
-        "to those that propagate, and orders off the mirror direction see a smaller |w|, a shallower surface. "
-        "The loss is largest in fine periods and where a blaze points below the horizon."
-    ),
-    (
-        "Where it gains: G / w² grows as 1 / cos(tr) towards the horizon, at normal incidence exactly so. An "
-        "order about to pass off is infinitely bright, and light beyond 70° makes albedos well above 1. Only "
-        "shadowing, which the default material has, holds that back."
-    ),
-    "A mirror's albedo is 1 while its lobe is narrow: at 85° a part of it lies below the horizon.",
-)
 
 
 def order_sum(grating: KnownGrating, sigma_um: float, w: float = -1.9) -> float:
@@ -123,7 +105,6 @@ def make(bench: Bench, progress: Progress) -> Page:
     sigma_um, known = bench.blazed.sigma_um, known_gratings()
     angles = _FEWER_DEG if bench.quick else _ANGLES_DEG
     clear = [deg for deg in _CLEAR_DEG if not bench.quick or deg in angles]
-    parseval = list(_order_sums(known, sigma_um))
     flat = Reference(HeightField(np.zeros((8, 32)), (2.0, 2.0)), sigma_um, LAMBDA_MIN_NM)
     mirror = {deg: albedo(flat, sigma_um, np.radians(deg), _REACH) for deg in _MIRROR_DEG}
     progress("energy", 0.1)
@@ -131,21 +112,12 @@ def make(bench: Bench, progress: Progress) -> Page:
     progress("energy", 0.3)
     snakes = {each.name: _albedos(each.field, each.sigma_um, angles) for each in (bench.elaphe, bench.xenopeltis)}
     progress("energy", 0.7)
-    reciprocity = list(_reciprocity(bench.elaphe, _FEWER_PAIRS if bench.quick else _PAIRS))
+    text = PageText("energy", lambda_nm=LAMBDA_NM)
+    reciprocity = list(_reciprocity(text, bench.elaphe, _FEWER_PAIRS if bench.quick else _PAIRS))
     progress("energy", 1.0)
-    return Page(
-        name="energy",
-        title="Energy balance and reciprocity",
-        source="not in [D14] or [S14]",
-        expected="The orders of exp(i k w h) share a mirror's light at any one w: their |c_m|² sum to 1, and a flat "
-        "mirror's directional albedo is 1. Directions have different w, and G / w² multiplies |P|², so a rough "
-        "surface keeps its energy only as far as its orders stay away from the horizon. Exchanging light and view "
-        "leaves the BRDF unchanged, exactly.",
-        checks=[*parseval, *_mirror_checks(mirror), *_lobe_checks(known, clear, lobes), *reciprocity],
-        tables=[_table(known, angles, snakes)],
-        pictures=[_curves(known, clear, lobes, angles, snakes)],
-        remarks=_REMARKS,
-    )
+    checks = [*_grating_checks(text, known, sigma_um, mirror, clear, lobes), *reciprocity]
+    picture = text.picture("albedo", _curves(text, known, clear, lobes, angles, snakes))
+    return text.page(checks, [_table(text, known, angles, snakes)], [picture])
 
 
 def _albedos(field: HeightField, sigma_um: float, angles: Sequence[float] | Array) -> Array:
@@ -153,59 +125,53 @@ def _albedos(field: HeightField, sigma_um: float, angles: Sequence[float] | Arra
     return np.array([albedo(reference, sigma_um, theta) for theta in np.radians(angles)])
 
 
-def _order_sums(known: Sequence[KnownGrating], sigma_um: float) -> Iterator[Check]:
+def _grating_checks(
+    text: PageText,
+    known: Sequence[KnownGrating],
+    sigma_um: float,
+    mirror: dict[float, float],
+    clear: Sequence[float],
+    lobes: dict[str, Array],
+) -> Iterator[Check]:
     for each in known:
-        off = abs(order_sum(each, sigma_um) - 1.0)
-        what = f"Σ|c_m|² of all orders at one w, {each.name}: distance from 1"
-        yield Check(f"{each.key}.order_sum", what, off, "<", _PARSEVAL, source="Parseval")
-
-
-def _mirror_checks(mirror: dict[float, float]) -> Iterator[Check]:
+        yield text.check("{key}.order_sum", abs(order_sum(each, sigma_um) - 1.0), key=each.key, grating=each.name)
     for deg, found in mirror.items():
-        tolerance = _MIRROR_TOLERANCE if deg <= _JUDGED_MIRROR else None
-        yield Check(f"mirror.{deg:g}", f"albedo of a flat mirror, light at {deg:g}°", found, "=", 1.0, tolerance)
-
-
-def _lobe_checks(known: Sequence[KnownGrating], clear: Sequence[float], lobes: dict[str, Array]) -> Iterator[Check]:
-    """The hemisphere's integral against the sum over orders, |c_m|^2 G / w^2."""
+        yield text.check(
+            "mirror.{deg:g}", found, deg=deg, tolerance=_MIRROR_TOLERANCE if deg <= _JUDGED_MIRROR else None
+        )
+    # the hemisphere's integral against the sum over orders, |c_m|^2 G / w^2
     angles = ", ".join(f"{deg:g}" for deg in clear)
     for each in known:
         worst = np.max(np.abs(lobes[each.name] - closed_albedo(each, np.radians(clear))))
-        what = f"albedo of {each.name} by integration, light at {angles}°: largest distance from Σ|c_m|² G / w²"
-        yield Check(f"{each.key}.albedo", what, worst, "<=", _LOBE_TOLERANCE)
+        yield text.check("{key}.albedo", worst, key=each.key, grating=each.name, angles=angles)
 
 
-def _reciprocity(surface: BenchSurface, count: int) -> Iterator[Check]:
+def _reciprocity(text: PageText, surface: BenchSurface, count: int) -> Iterator[Check]:
     """The reference and the polar table of a surface, under several materials."""
     wi, wr = pairs(count)
     for key, (name, material) in _MATERIALS.items():
         config = surface.config.model_copy(update={"material": material})
         for method, title in ((EXACT, "exact reference"), (OURS, "polar table")):
             found = asymmetry(METHODS[method](surface.field, config), wi, wr)
-            what = f"{title}, {surface.name}, {name}: relative change of the BRDF as light and view are exchanged"
-            yield Check(f"reciprocity.{key}.{method.replace(' ', '_')}", what, found, "<=", _RECIPROCITY)
+            known = {"key": key, "method": method.replace(" ", "_"), "title": title}
+            yield text.check("reciprocity.{key}.{method}", found, **known, surface=surface.name, material=name)
 
 
-def _table(known: Sequence[KnownGrating], angles: Array, snakes: dict[str, Array]) -> PageTable:
+def _table(text: PageText, known: Sequence[KnownGrating], angles: Array, snakes: dict[str, Array]) -> PageTable:
     shown = [deg for deg in _SHOWN_DEG if deg in angles]
-    return PageTable(
-        "albedo",
-        f"Directional albedo at {LAMBDA_NM:g} nm, R = 1: 1 is a surface that loses nothing",
-        [Column("surface"), *numbers("{:.3f}", *(f"light at {deg:g}°" for deg in shown))],
-        [
-            *((each.name, *closed_albedo(each, np.radians(shown))) for each in known),
-            *((name, *found[np.isin(angles, shown)]) for name, found in snakes.items()),
-        ],
-    )
+    rows: list[tuple[Cell, ...]] = [(each.name, *closed_albedo(each, np.radians(shown))) for each in known]
+    rows += [(name, *found[np.isin(angles, shown)]) for name, found in snakes.items()]
+    return text.table("albedo", rows, numbers("{:.3f}", *(f"light at {deg:g}°" for deg in shown)))
 
 
 def _curves(
+    text: PageText,
     known: Sequence[KnownGrating],
     clear: Sequence[float],
     lobes: dict[str, Array],
     angles: Array,
     snakes: dict[str, Array],
-) -> Picture:
+) -> bytes:
     dense, ratios = np.linspace(0.0, 80.0, 641), np.geomspace(1.05, 20.0, 800)
     closed, by_period, colours = [], [], dict(zip([*(g.name for g in known), *snakes], COLOURS, strict=False))
     for each in known:
@@ -215,20 +181,5 @@ def _curves(
         normal = [closed_albedo(each, np.zeros(1), 1e-3 * LAMBDA_NM * ratio)[0] for ratio in ratios]
         by_period.append(Series(each.name, ratios, normal, colour, "-"))
     integrated = [Series(name, angles, found, colours[name]) for name, found in snakes.items()]
-
-    def chart(title: str, x_label: str, series: Sequence[Series], **look: Any) -> Chart:
-        look = {"y_scale": "linear", "y_limits": (0.0, 1.6), "level": (1.0, ""), **look}
-        return Chart(title, x_label, "directional albedo", series, **look)
-
-    light = "polar angle of the light (°)"
-    drawn = [
-        chart("Gratings", light, closed),
-        chart("Snakes", light, integrated),
-        chart("Gratings in normal light", "period / wavelength", by_period, x_scale="log"),
-    ]
-    return Picture(
-        charts([drawn], (4.3, 4.3)),
-        f"Directional albedo at {LAMBDA_NM:g} nm, R = 1, no shadowing. Left: sums of the propagating orders' "
-        "|c_m|² G / w² (lines), the BRDF integrated over the hemisphere (circles). Middle: the bench's snakes, "
-        "integrated. Right: gratings in normal light against their period.",
-    )
+    drawn = {"gratings": closed, "snakes": integrated, "periods": by_period}
+    return charts([[text.chart(key, series) for key, series in drawn.items()]], (4.3, 4.3))

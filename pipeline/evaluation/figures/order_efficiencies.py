@@ -14,7 +14,7 @@ from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures.page import Bench, Page, PageTable, Picture, numbers
+from pipeline.evaluation.figures.page import Bench, Page, PageTable, PageText, Picture, numbers
 from pipeline.evaluation.plots.charts import Chart, Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
 from pipeline.optics import geometry, gratings
@@ -26,8 +26,6 @@ from pipeline.tables.polar import spectral
 
 # of a mirror's peak: the error allowed in every order
 TOLERANCE = 1e-4
-# the tolerance of the reference
-ROUNDING = 1e-9
 # of radii of E, in sigma_f: a laser line's 0.4 leaves 1e-3 between them
 FINE_SPACING = 0.25
 
@@ -172,19 +170,16 @@ class Answers:
     polar: Array
     polar_of_a_line: Array
 
-    def differences(self) -> dict[str, tuple[str, Array, float]]:
-        """Return, by the check's name: its words, the difference from a closed form (n,), and its bound."""
-        samples, profile = "from the samples' closed form", "from the profile's"
-        fine, line = (f"polar power spectrum E, radii {h:g} σ_f apart" for h in (FINE_SPACING, _LINE_SPACING))
+    def differences(self) -> dict[str, tuple[Array, dict[str, float]]]:
+        """Return, by the check's name: the difference from a closed form (n,), and what its words and bound need."""
         return {
-            "direct": (f"sum over samples, {samples}", self.direct - self.samples, ROUNDING),
-            "reference": (f"exact reference, {samples}", self.reference - self.samples, ROUNDING),
-            "reference.profile": (f"exact reference, {profile}", self.reference - self.profile, TOLERANCE),
-            "polar": (f"{fine}, {profile}", self.polar - self.profile, TOLERANCE),
+            "direct": (self.direct - self.samples, {}),
+            "reference": (self.reference - self.samples, {}),
+            "reference.profile": (self.reference - self.profile, {"bound": TOLERANCE}),
+            "polar": (self.polar - self.profile, {"bound": TOLERANCE, "spacing": FINE_SPACING}),
             "polar.line": (
-                f"{line} (a laser line's), {samples}",
                 self.polar_of_a_line - self.samples,
-                between_radii(_LINE_SPACING),
+                {"bound": between_radii(_LINE_SPACING), "spacing": _LINE_SPACING},
             ),
         }
 
@@ -232,94 +227,59 @@ def make(bench: Bench, progress: Progress) -> Page:
     needed = {g.name: samples_needed(g, at) for g in known[1:]}
     measured = {g.name: [measured_sampling_error(g, sigma_um, at, m) for m in _SAMPLES] for g in known[1:]}
     progress("order efficiencies", 1.0)
-    return Page(
-        name="order_efficiencies",
-        title="Order efficiencies against closed forms",
-        source="not in [D14] or [S14]",
-        expected="|P|² at f = m / period is |c_m|², the Fourier coefficient of exp(i k w h): a Bessel function of a "
-        "sinusoid, the sinc of a step and of a sawtooth. Wanted of the reference and of the polar power spectrum: "
-        f"{TOLERANCE:g} of the mirror's peak, in normal and oblique light, in the plane of the orders and across it.",
+    text = PageText("order_efficiencies", tolerance=TOLERANCE, period_um=PERIOD_UM)
+    sampled = list(zip(_SAMPLES, *measured.values(), strict=True))
+    return text.page(
         checks=[check for grating in known for check in checks_of(grating, found[grating.name])],
-        tables=[_table(found, at), _sampling_table(measured)],
-        pictures=_pictures(found, measured, at),
-        remarks=_remarks(needed),
+        tables=[_table(text, found, at), text.table("sampling", sampled, numbers("{:.1e}", *measured))],
+        pictures=_pictures(text, found, measured, at),
+        remarks=_remarks(text, needed),
     )
 
 
 def checks_of(grating: KnownGrating, found: Answers) -> Iterator[Check]:
     """Return the checks of one grating: the largest difference of each algorithm from its closed form."""
-    for name, (what, difference, bound) in found.differences().items():
-        worst = np.max(np.abs(difference))
-        yield Check(f"{grating.key}.{name}", f"{grating.name}: {what}", worst, "<=", bound, source="closed form")
+    text = PageText("order_efficiencies", key=grating.key, grating=grating.name)
+    for name, (difference, known) in found.differences().items():
+        yield text.check(f"{{key}}.{name}", np.max(np.abs(difference)), **known)
 
 
-def _table(found: dict[str, Answers], at: Orders) -> PageTable:
+def _table(text: PageText, found: dict[str, Answers], at: Orders) -> PageTable:
     """Orders 0 and 1 under every light, at the wavelength in the middle."""
     middle = np.unique(at.lambda_nm)[len(np.unique(at.lambda_nm)) // 2]
-    algorithms = ("closed form", "exact reference", "sum over samples", "polar power spectrum E")
-    return PageTable(
-        "orders",
-        f"|c_m|² at {middle:g} nm",
-        [
-            *numbers("{}", "grating"),
-            *numbers("{:.0f}", "order"),
-            *numbers("{:g}°, azimuth {:g}°", "light"),
-            *numbers("{:.7f}", *algorithms),
-        ],
-        [
-            (
-                name,
-                at.order[i],
-                LIGHTS_DEG[at.light[i]],
-                *(values[i] for values in (each.profile, each.reference, each.direct, each.polar)),
-            )
-            for name, each in found.items()
-            for i in np.flatnonzero((at.lambda_nm == middle) & np.isin(at.order, (0, 1)))
-        ],
-    )
+    rows = [
+        (
+            name,
+            at.order[i],
+            LIGHTS_DEG[at.light[i]],
+            each.profile[i],
+            each.reference[i],
+            each.direct[i],
+            each.polar[i],
+        )
+        for name, each in found.items()
+        for i in np.flatnonzero((at.lambda_nm == middle) & np.isin(at.order, (0, 1)))
+    ]
+    return text.table("orders", rows, middle=middle)
 
 
-def _sampling_table(measured: dict[str, list[float]]) -> PageTable:
-    return PageTable(
-        "sampling",
-        "Largest difference of |c_m|² between samples and profile, by the exact reference",
-        [*numbers("{}", "samples a period"), *numbers("{:.1e}", *measured)],
-        list(zip(_SAMPLES, *measured.values(), strict=True)),
-    )
-
-
-def _pictures(found: dict[str, Answers], measured: dict[str, list[float]], at: Orders) -> list[Picture]:
-    known = known_gratings()
-    orders = [[_chart(grating, found[grating.name], at, light) for grating in known] for light in _SHOWN]
-    series = []
+def _pictures(
+    text: PageText, found: dict[str, Answers], measured: dict[str, list[float]], at: Orders
+) -> list[Picture]:
+    known, series = known_gratings(), []
+    orders = [[_chart(text, grating, found[grating.name], at, light) for grating in known] for light in _SHOWN]
     for grating, colour in zip(known[1:], COLOURS[1:], strict=False):
         closed = [sampling_error(grating, m, at) for m in _SAMPLES]
         series.append(Series(grating.name, _SAMPLES, closed, colour, "-"))
         series.append(Series("", _SAMPLES, measured[grating.name], colour, "o"))
-    sampling = Chart(
-        "Sampling",
-        "samples a period",
-        "largest difference of |c_m|²",
-        series,
-        x_scale="log",
-        level=(TOLERANCE, f"allowed: {TOLERANCE:g}"),
-        floor=1e-7,
-    )
+    sampling = text.chart("sampling", series, level=(TOLERANCE, f"allowed: {TOLERANCE:g}"))
     return [
-        Picture(
-            charts(orders, (4.1, 3.2), shared_legend=True),
-            f"|c_m|² against wavelength, period {PERIOD_UM:g} µm. Lines: closed forms. Circles: exact reference. "
-            "Crosses: polar power spectrum E. Above in normal light, below at 60°.",
-        ),
-        Picture(
-            charts([[sampling]], (7.2, 4.4)),
-            "Sharp edges under sampling: the largest difference from the profile's closed form, of the exact "
-            "reference (circles) and of the geometric sums (lines).",
-        ),
+        text.picture("orders", charts(orders, (4.1, 3.2), shared_legend=True)),
+        text.picture("sampling", charts([[sampling]], (7.2, 4.4))),
     ]
 
 
-def _chart(grating: KnownGrating, found: Answers, at: Orders, light: int) -> Chart:
+def _chart(text: PageText, grating: KnownGrating, found: Answers, at: Orders, light: int) -> Chart:
     """Draw orders near the mirror direction against wavelength under one light."""
     dense = propagating(np.linspace(at.lambda_nm.min(), at.lambda_nm.max(), 181))
     power, series = grating.power(dense.order, dense.s_per_um), []
@@ -330,25 +290,14 @@ def _chart(grating: KnownGrating, found: Answers, at: Orders, light: int) -> Cha
         series.append(Series(label, dense.lambda_nm[line], power[line], colour, style))
         series.append(Series("", at.lambda_nm[dots], found.reference[dots], colour, "o"))
         series.append(Series("", at.lambda_nm[dots], found.polar[dots], colour, "x"))
-    title = f"{grating.name}, light at {LIGHTS_DEG[light][0]:g}°"
-    return Chart(title, "wavelength (nm)", "|c_m|², share of the mirror", series, y_scale="linear")
+    return text.chart("orders", series, grating=grating.name, deg=LIGHTS_DEG[light][0])
 
 
-def _remarks(needed: dict[str, int]) -> list[str]:
+def _remarks(text: PageText, needed: dict[str, int]) -> list[str]:
     pitches = " and ".join(
         f"{samples} samples a period ({1e3 * PERIOD_UM / samples:.0f} nm) of the {name.split(',')[0]}"
         for name, samples in needed.items()
     )
-    return [
-        (
-            "A step is not band-limited, so its samples are another grating, above the profile's orders by up to 4 "
-            "/ 3M² of a rectangle and 1 / 3M² of a blaze, M samples a period. The reference shows that to rounding, "
-            f"so the error is the samples' and not the sum's. {TOLERANCE:g} of the mirror takes {pitches}. A "
-            "sinusoid needs no more samples than its orders do."
-        ),
-        (
-            "E between its radii is interpolated on 8 of them. At a laser line's distance that leaves "
-            f"{between_radii(_LINE_SPACING):.1e} of an order's peak at most, at {FINE_SPACING:g} σ_f "
-            f"{between_radii(FINE_SPACING):.1e}. Integrals over wavelengths average it out."
-        ),
-    ]
+    line, fine = between_radii(_LINE_SPACING), between_radii(FINE_SPACING)
+    radii = text.remark("radii", between_line=line, fine=FINE_SPACING, between_fine=fine)
+    return [text.remark("steps", pitches=pitches), radii]

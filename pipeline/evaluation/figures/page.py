@@ -1,6 +1,6 @@
 """One page of the validation bench: checks, tables of typed columns and pictures; and the surfaces it is made of."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.check import Check
+from pipeline.evaluation.plots.charts import Chart, Series
+from pipeline.evaluation.texts import Texts
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
@@ -110,6 +112,56 @@ class Page:
             ],
             "tables": {table.id: table.records for table in self.tables},
         }
+
+
+class PageText(Texts):
+    """The words of a page, figures/texts/NAME.toml, put together with what its module computes."""
+
+    def __init__(self, name: str, **values: Any) -> None:
+        super().__init__("pipeline.evaluation.figures", name, **values)
+        self._name = name
+
+    def columns(self, key: str, /, **values: Any) -> list[Column]:
+        """Return the columns of [tables.KEY]: each is a name, or a list of a format and the names that have it."""
+        entries = self.words["tables"][key]["columns"]
+        formed = [("{}", [each]) if isinstance(each, str) else (each[0], each[1:]) for each in entries]
+        return [Column(self.fill(name, **values), form) for form, names in formed for name in names]
+
+    def table(
+        self, key: str, rows: Iterable[Sequence[Cell]], more: Sequence[Column] = (), /, **values: Any
+    ) -> PageTable:
+        """Return [tables.KEY] with its rows. more: columns that follow those of the file."""
+        caption = self.fill(self.words["tables"][key]["caption"], **values)
+        return PageTable(values.get("id", key), caption, [*self.columns(key, **values), *more], list(rows))
+
+    def picture(self, key: str, png: bytes, /, **values: Any) -> Picture:
+        """Return a picture with its caption of [pictures]."""
+        return Picture(png, self.fill(self.words["pictures"][key], **values))
+
+    def chart(self, key: str, series: Sequence[Series], /, **known: Any) -> Chart:
+        """Return [charts.KEY] with its curves. known: values of its texts, and computed fields of `Chart`."""
+        words = {
+            name: self.fill(each, **known) if isinstance(each, str) else each
+            for name, each in self.words["charts"][key].items()
+        }
+        computed = {name: each for name, each in known.items() if name in Chart.__dataclass_fields__}
+        return Chart(**{**words, **computed, "series": series})
+
+    def remark(self, key: str, /, **values: Any) -> str:
+        """Return a text of [remarks]."""
+        return self.fill(self.words["remarks"][key], **values)
+
+    def page(
+        self,
+        checks: Iterable[Check],
+        tables: Sequence[PageTable],
+        pictures: Sequence[Picture],
+        remarks: Sequence[str] | None = None,
+    ) -> Page:
+        """Return the page. remarks: None for all of the file."""
+        title, source, expected = (self.fill(self.words[name]) for name in ("title", "source", "expected"))
+        explained = [self.remark(key) for key in self.words["remarks"]] if remarks is None else remarks
+        return Page(self._name, title, source, expected, list(checks), tables, pictures, explained)
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import planes
 from pipeline.evaluation.figures.bands import VISIBLE_CONTRAST, Bands
 from pipeline.evaluation.figures.laser_screen import DELTA_E, LIGHT, Colour, Screen, experiment, screen_bands
-from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Column, Page, PageTable, Picture, numbers
+from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageText, Picture
 from pipeline.evaluation.methods.catalogue import BUMPS, EXACT, METHODS, OURS, PAPER, STAM
 from pipeline.evaluation.methods.paper_look_up import PaperLookUp
 from pipeline.evaluation.methods.stam_gaussian import DiscWindow, StamGaussian
 from pipeline.evaluation.plots import screen_plots
-from pipeline.evaluation.plots.charts import Chart, Series, charts
+from pipeline.evaluation.plots.charts import Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
 from pipeline.optics import geometry
 from pipeline.optics.colour import EXPOSURES_RU, delta_e
@@ -38,27 +38,10 @@ PUBLISHED = {
     PAPER: dict(zip(EXPOSURES_RU, (0.039, 4.295, 11.544), strict=True)),
     STAM: dict(zip(EXPOSURES_RU, (0.067, 7.843, 23.704), strict=True)),
 }
-_RU_COLUMNS = [f"{ru:g} RU" for ru in EXPOSURES_RU]
 _BETTER = 10.0
 _AVERAGED = 3
 _OTHER_SIDE_MM = 100.0
 _CHECKED_PIXELS, _CHECKED_NM, _SEED = 5, (450.0, 550.0, 700.0), 4
-_BENCHMARK_ERROR = 1e-9
-_MODELLED = (
-    "Errors are of the radiance that the shader shows; neither the screen's own cosine nor a white balance "
-    "is applied. The laser's spectrum is a model (supercontinuum.csv), and the screen's size is not published. "
-    "On a smaller screen all pixels are nearer to the spot, brighter, and err more."
-)
-_ON_A_SCAN = (
-    "Stam's Gaussian surface knows the heights by their correlation alone, which is the same along and "
-    "against the fingers: its image is symmetric and without speckle. Of the secondary bands a faint pair is "
-    "left, where [D14] sees none: this scan's correlation has the period along its fingers, and for low "
-    "heights the formula is their power spectrum. A vertical band appears next to the spot, as in [D14] 6.3."
-)
-_ON_A_RECIPE = (
-    "This Elaphe is a recipe whose fingers have a firm period along their length. Their correlation has "
-    "it too, so Stam's Gaussian surface does show horizontal bands here, unlike on the scan."
-)
 
 # CIELAB errors (pixels, pixels) of methods by name, at exposures
 _Errors = Mapping[str, Mapping[float, Array]]
@@ -88,41 +71,33 @@ def make(bench: Bench, progress: Progress) -> Page:
     bands = {name: screen_bands(image[..., 1], screen.axis_mm()) for name, image in banded.items()}
     worst = _benchmark_error(reference, surface, screen)
     progress("screen", 1.0)
-    pixels = f"{screen.pixels} x {screen.pixels} pixels"
-    tables = [
-        _errors_table("errors", f"Mean CIELAB error, {pixels}, each its middle", errors),
-        _errors_table("averaged", f"The same, each pixel the mean of {_AVERAGED} x {_AVERAGED} directions", averaged),
-        _tails_table(errors),
-        _bands_table(bands),
-    ]
-    if nearer:
-        caption = f"Mean CIELAB error on a screen of {_OTHER_SIDE_MM:g} mm: nearer to the spot"
-        tables.insert(2, _errors_table("nearer", caption, nearer))
-    return Page(
-        name="screen",
-        title="A laser on gold-coated Elaphe, seen on a screen",
-        source="[D14] table 2, fig. 10, 11, sec. 6.2, 6.3",
-        expected="Mean CIELAB error a pixel at exposures of 1 / 1000 / 7500 RU against windowing in space: published "
-        "0.039 / 4.295 / 11.544 for [D14]'s table and 0.067 / 7.843 / 23.704 for Stam's correlation method. Our "
-        f"table is to stay {_BETTER:g} times below the paper's layout at every exposure, and Stam's Gaussian surface "
-        "to show no secondary horizontal bands.",
+    text = PageText(
+        "screen",
+        better=_BETTER,
+        budget=DELTA_E,
+        default_budget=DEFAULT_DELTA_E,
+        averaged=_AVERAGED,
+        pixels=screen.pixels,
+        side_mm=_OTHER_SIDE_MM,
+        dim=EXPOSURES_RU[1],
+        bright=EXPOSURES_RU[2],
+        checked=(_CHECKED_PIXELS + 1, len(_CHECKED_NM)),
+    )
+    compared = {"errors": errors, "averaged": averaged, **({"nearer": nearer} if nearer else {})}
+    return text.page(
         checks=[
-            *_error_checks(errors),
-            *_nearer_checks(nearer),
-            Check(
-                "benchmark",
-                "largest difference of |P|² between the benchmark and the sum over samples under the window in space",
-                worst,
-                "<=",
-                _BENCHMARK_ERROR,
-                source="the reference's tolerance",
-                remark=f"on {_CHECKED_PIXELS + 1} pixels and {len(_CHECKED_NM)} wavelengths",
-            ),
-            *_band_checks(bands, surface),
+            *_error_checks(text, errors),
+            *_nearer_checks(text, nearer),
+            text.check("benchmark", worst),
+            *_band_checks(text, bands, surface),
         ],
-        tables=tables,
-        pictures=_pictures(truth, images, bands, screen),
-        remarks=_remarks(errors, images, truth, surface),
+        tables=[
+            *(text.table(key, _error_rows(each)) for key, each in compared.items()),
+            text.table("tails", _tail_rows(errors)),
+            text.table("bands", ((_NAMES.get(name, name), of.contrast, of.share) for name, of in bands.items())),
+        ],
+        pictures=_pictures(text, truth, images, bands, screen),
+        remarks=_remarks(text, errors, images, truth, surface),
     )
 
 
@@ -169,107 +144,67 @@ def _times_below(errors: _Errors, name: str, ru: float) -> float:
     return _mean(errors, PAPER, ru) / _mean(errors, name, ru)
 
 
-def _error_checks(errors: _Errors) -> Iterator[Check]:
+def _error_checks(text: PageText, errors: _Errors) -> Iterator[Check]:
     for ru in EXPOSURES_RU:
-        what, ratio = f"mean error of the paper's layout over ours at {ru:g} RU", _times_below(errors, OURS, ru)
-        yield Check(f"paper_over_ours.{ru:g}", what, ratio, ">=", _BETTER, source="this project's aim")
+        yield text.check("paper_over_ours.{ru:g}", _times_below(errors, OURS, ru), bound=_BETTER, ru=ru)
         for key, name in (("paper", PAPER), ("stam", STAM)):
-            what, mean = f"mean error of {_NAMES[name]}, at {ru:g} RU", _mean(errors, name, ru)
-            yield Check(f"{key}.{ru:g}", what, mean, "=", PUBLISHED[name][ru], source="[D14] table 2")
+            known = {"method": _NAMES[name], "ru": ru, "bound": PUBLISHED[name][ru]}
+            yield text.check(f"{key}.{{ru:g}}", _mean(errors, name, ru), **known)
 
 
-def _nearer_checks(errors: _Errors) -> Iterator[Check]:
-    """The same on another screen, reported: [D14] does not state how large its screen is."""
+def _nearer_checks(text: PageText, errors: _Errors) -> Iterator[Check]:
     for ru in EXPOSURES_RU if errors else ():
-        what = f"screen of {_OTHER_SIDE_MM:g} mm: mean error of the paper's layout over ours at {ru:g} RU"
-        yield Check(f"nearer.paper_over_ours.{ru:g}", what, _times_below(errors, OURS, ru))
+        yield text.check("nearer.paper_over_ours.{ru:g}", _times_below(errors, OURS, ru), ru=ru)
 
 
-def _band_checks(bands: Mapping[str, Bands], surface: BenchSurface) -> Iterator[Check]:
+def _band_checks(text: PageText, bands: Mapping[str, Bands], surface: BenchSurface) -> Iterator[Check]:
     # a recipe's fingers have a firm period along their length, which the correlation knows as well
     visible = VISIBLE_CONTRAST if surface.scan else None
-    what = "contrast of the secondary horizontal bands"
-    for key, name in (("gaussian", STAM), ("disc", STAM_DISC)):
-        contrast, source = bands[name].contrast, "[D14] 6.3: no bands"
-        yield Check(f"bands.{key}", f"{what}: {_NAMES[name]}", contrast, "<=", visible, source=source)
-    yield Check("bands.exact", f"{what}: exact", bands[EXACT].contrast)
+    for key, name in (("bands.gaussian", STAM), ("bands.disc", STAM_DISC)):
+        yield text.check(key, bands[name].contrast, bound=visible, method=_NAMES[name])
+    yield text.check("bands.exact", bands[EXACT].contrast)
 
 
-def _errors_table(key: str, caption: str, errors: _Errors) -> PageTable:
-    def row(name: str) -> tuple[Cell, ...]:
-        published = PUBLISHED.get(name)
-        printed = None if published is None else tuple(published.values())
-        return _NAMES[name], *(_mean(errors, name, ru) for ru in EXPOSURES_RU), printed
-
-    columns = [Column("method"), *numbers("{:.3g}", *_RU_COLUMNS), Column("published", "{:g} / {:g} / {:g}")]
-    return PageTable(key, caption, columns, [row(name) for name in errors])
+def _error_rows(errors: _Errors) -> Iterator[tuple[Cell, ...]]:
+    for name in errors:
+        printed = tuple(PUBLISHED[name].values()) if name in PUBLISHED else None
+        yield _NAMES[name], *(_mean(errors, name, ru) for ru in EXPOSURES_RU), printed
 
 
-def _tails_table(errors: _Errors) -> PageTable:
-    return PageTable(
-        "tails",
-        "99th percentile / maximum",
-        [Column("method"), *numbers("{:.3g} / {:.3g}", *_RU_COLUMNS)],
-        [
-            (_NAMES[name], *((float(np.percentile(each, 99)), float(each.max())) for each in found.values()))
-            for name, found in errors.items()
-        ],
-    )
+def _tail_rows(errors: _Errors) -> Iterator[tuple[Cell, ...]]:
+    for name, found in errors.items():
+        yield _NAMES[name], *((float(np.percentile(each, 99)), float(each.max())) for each in found.values())
 
 
-def _bands_table(bands: Mapping[str, Bands]) -> PageTable:
-    return PageTable(
-        "bands",
-        "Secondary horizontal bands: the strongest one's contrast, and their share of the light outside the primary",
-        [Column("image"), Column("contrast", "{:.2f}"), Column("share", "{:.1%}")],
-        [(_NAMES.get(name, name), found.contrast, found.share) for name, found in bands.items()],
-    )
-
-
-def _pictures(truth: Array, images: Mapping[str, Array], bands: Mapping[str, Bands], screen: Screen) -> list[Picture]:
+def _pictures(
+    text: PageText, truth: Array, images: Mapping[str, Array], bands: Mapping[str, Bands], screen: Screen
+) -> list[Picture]:
     shown = {_NAMES[name]: images[name] for name in (OURS, PAPER, STAM, BUMPS)}
-    dim, bright = EXPOSURES_RU[1:]
-    sheet = screen_plots.sheet(truth, shown, screen.side_mm, dim, bright)
     upwards = screen.axis_mm()[::-1]
     series = [
         Series(_NAMES.get(name, name), upwards, bands[name].profile, colour, ":" if name == EXACT else "-")
         for name, colour in zip((OURS, PAPER, STAM, STAM_DISC, EXACT), (*COLOURS[:4], COLOURS[-1]), strict=True)
     ]
-    rows = Chart("Rows of the screen", "y on the screen (mm)", "mean Y of the row under 1 RU", series, floor=0.0)
     return [
-        Picture(sheet, f"The screen at {dim:g} and {bright:g} RU, and each method's CIELAB error at {bright:g} RU"),
-        Picture(
-            charts([[rows]], (8.6, 4.2)),
-            "Rows of the screen without the spot's columns: primary band, and secondary bands where there are any",
-        ),
+        text.picture("sheet", screen_plots.sheet(truth, shown, screen.side_mm, *EXPOSURES_RU[1:])),
+        text.picture("rows", charts([[text.chart("rows", series)]], (8.6, 4.2))),
     ]
 
 
-def _remarks(errors: _Errors, images: Mapping[str, Array], truth: Array, surface: BenchSurface) -> list[str]:
+def _remarks(
+    text: PageText, errors: _Errors, images: Mapping[str, Array], truth: Array, surface: BenchSurface
+) -> list[str]:
     ours = errors[OURS][EXPOSURES_RU[0]]
     middle = len(ours) // 2
     nearest = ours[middle - 1 : middle + 2, middle - 1 : middle + 2]
-    spot = 100.0 * (images[OURS][middle, middle] / truth[middle, middle] - 1.0)
+    shares = {"nearest": 100 * nearest.sum() / ours.sum(), "spot": 100 * ours[middle, middle] / ours.sum()}
+    off = 100.0 * (images[OURS][middle, middle] / truth[middle, middle] - 1.0)
     zero, paper = (" / ".join(f"{_mean(errors, n, ru):.3g}" for ru in EXPOSURES_RU) for n in (PAPER_AT_ZERO, PAPER))
     default = " / ".join(f"{_times_below(errors, OURS_DEFAULT, ru):.1f}" for ru in EXPOSURES_RU)
     return [
-        (
-            f"Our table is planned for a mean error of {DELTA_E:g} on random views at 7500 RU, tighter than the "
-            f"default {DEFAULT_DELTA_E:g}, with which it is {default} times below the paper's layout: random views "
-            "hardly meet the few pixels about the mirror direction that count at 1 RU."
-        ),
-        (
-            "At 1 RU the screen is black but for the spot: of our table's error the nine pixels about the mirror "
-            f"direction hold {100 * nearest.sum() / ours.sum():.0f} %, the spot alone "
-            f"{100 * ours[middle, middle] / ours.sum():.0f} % (X, Y, Z off by {spot[0]:+.2f}, {spot[1]:+.2f}, "
-            f"{spot[2]:+.2f} %)."
-        ),
-        (
-            f"The paper's layout is made here with the window that the benchmark has, and errs by {paper}. With the "
-            "window on sample 0, as in public codes, it is the table of another part of the skin and errs by "
-            f"{zero}, against the published 0.039 / 4.295 / 11.544: much of the published error may be that, and not "
-            "the table's grid."
-        ),
-        _MODELLED,
-        _ON_A_SCAN if surface.scan else _ON_A_RECIPE,
+        text.remark("planned", default=default),
+        text.remark("dark", **shares, off=off),
+        text.remark("window", paper=paper, zero=zero),
+        text.remark("modelled"),
+        text.remark("on_a_scan" if surface.scan else "on_a_recipe"),
     ]
