@@ -178,8 +178,7 @@ def test_gsf_without_units_states_the_ratio(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "data", "said"),
     [
-        ("a.nhf", b"\x89HDF\r\n\x1a\n", "Nanosurf .nhf"),
-        ("a.h5-jpk", b"\x89HDF\r\n\x1a\n", "JPK .h5-jpk"),
+        ("a.nhf", b"\x89HDF\r\n\x1a\n", "HDF5"),
         ("a.Z_mtrx", b"ONTMATRX0101", "Omicron MATRIX"),
         ("a.dat", b"[Paramco32]\r\nKey / Value=0\r\n" + b"\0\1\2" * 99, "Createc"),
         ("a.asd", bytes(range(40)), "Asahi"),
@@ -204,11 +203,19 @@ def test_a_format_that_cannot_be_read_is_named(tmp_path: Path, name: str, data: 
     assert said in message
 
 
-def test_force_curves_of_jpk_are_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("member", "said"),
+    [
+        ("header.properties", "JPK force curves"),
+        ("xl/workbook.xml", "an Excel workbook; save the sheet with the heights as .csv"),
+        ("Kontur1.prf", "a line profile of Mahr"),
+    ],
+)
+def test_zips_that_are_not_read_are_named(tmp_path: Path, member: str, said: str) -> None:
     path = tmp_path / "a.zip"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("header.properties", "x")
-    with pytest.raises(InputError, match="JPK force curves"):
+        archive.writestr(member, "x")
+    with pytest.raises(InputError, match=said):
         read_scan(path, None)
 
 
@@ -216,7 +223,7 @@ def test_every_format_of_the_library_is_offered() -> None:
     from SurfaceTopography.IO import lookup_reader_by_format
 
     # read here by other means, or profiles and elevation models without a scan
-    elsewhere = {"gwy", "ezd", "npy", "npz", "xyz", "hgt"}
+    elsewhere = {"gwy", "ezd", "npy", "npz", "xyz", "hgt", "qep", "mitutoyo"}
     assert set(lookup_reader_by_format) - elsewhere <= set(BY_LIBRARY)
     assert len({entry.key for entry in READ}) == len(READ)
 

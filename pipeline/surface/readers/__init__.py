@@ -6,7 +6,7 @@ which are imported only when a file needs them.
 
 from pathlib import Path
 
-from pipeline.surface.readers import array, gsf, gwyddion, image, nanonis, nanosurf, spm, text
+from pipeline.surface.readers import array, gsf, gwyddion, hdf5, image, nanonis, nanosurf, spm, text
 from pipeline.surface.readers.formats import BY_LIBRARY
 from pipeline.surface.readers.sniff import sniff
 from pipeline.surface.scan import Scan
@@ -20,6 +20,8 @@ _READERS = {
     "gsf": gsf.read,
     "nanonis": nanonis.read,
     "nanosurf": nanosurf.read,
+    "nhf": hdf5.read_nanosurf,
+    "h5jpk": hdf5.read_jpk,
 }
 
 

@@ -36,11 +36,13 @@ _MISSING_BYTES = re.compile(
     re.IGNORECASE,
 )
 
-_HEIGHT_NAME = re.compile(r"height|topo|z[ _-]?(sensor|axis|scan)|^z\b|elevation|höhe|hauteur", re.IGNORECASE)
+_HEIGHT_NAME = re.compile(
+    r"height|topo|z[ _-]?(sensor|axis|scan|controller)|\bposition z|^z\b|elevation|höhe|hauteur", re.IGNORECASE
+)
 _RETURN_NAME = re.compile(r"retrace|backward|bwd|\breverse", re.IGNORECASE)
 _SECOND_NAME = re.compile(r"interleave|\bnap|lift", re.IGNORECASE)
 # heights by a sensor are truer than those by the voltage on a piezo, which creeps and bends
-_SENSOR_NAME = re.compile(r"sens|measured", re.IGNORECASE)
+_SENSOR_NAME = re.compile(r"sens|measured|\bposition z", re.IGNORECASE)
 _NO_HEIGHT_NAME = re.compile(
     r"deflection|amplitude|phase|error|friction|lateral|adhesion|dissipation|deformation|indentation|stiffness|"
     r"modulus|current|intensity|texture|potential|bias|voltage|lock-?in|frequency|drive|damping|\bdfl|\bmag\b",

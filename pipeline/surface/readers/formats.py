@@ -28,6 +28,8 @@ READ = (
     Format("gsf", "Gwyddion .gsf", (".gsf",), OWN),
     Format("nanonis", "Nanonis .sxm", (".sxm",), "nanonispy2"),
     Format("nanosurf", "Nanosurf .nid/.ezd", (".nid", ".ezd"), OWN),
+    Format("nhf", "Nanosurf .nhf", (".nhf",), "h5py"),
+    Format("h5jpk", "JPK .h5-jpk", (".h5-jpk",), "h5py"),
     Format("di", "Bruker/Veeco Nanoscope", (".spm", ".000", ".001", ".di"), LIBRARY),
     Format("ibw", "Igor binary wave", (".ibw",), LIBRARY),
     Format("jpk", "JPK image scan", (".jpk", ".jpk-qi-image"), LIBRARY),
@@ -59,8 +61,6 @@ READ = (
     Format("oir", "Olympus .oir", (".oir",), LIBRARY),
     Format("poir", "Olympus .poir", (".poir",), LIBRARY),
     Format("nmm", "nano measuring machine .zip", (".zip",), LIBRARY),
-    Format("qep", "Mahr MarWin .qep", (".qep",), LIBRARY),
-    Format("mitutoyo", "Mitutoyo SurfTest .xlsx", (".xlsx",), LIBRARY),
     Format("nc", "NetCDF", (".nc",), LIBRARY),
     Format("mat", "MATLAB .mat", (".mat",), LIBRARY),
     Format("h5", "HDF5", (".h5", ".hdf5"), LIBRARY),
@@ -86,8 +86,6 @@ NOT_READ = (
 )
 # recognised by their suffix beside a container's bytes, and not read
 NOT_READ_SUFFIXES = {
-    ".nhf": "a Nanosurf .nhf file (HDF5)",
-    ".h5-jpk": "a JPK .h5-jpk file (HDF5)",
     ".jpk-force": "JPK force curves",
     ".jpk-force-map": "a JPK force map",
     ".jpk-qi-data": "JPK QI data (their image is the .jpk-qi-image)",

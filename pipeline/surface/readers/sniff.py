@@ -81,6 +81,8 @@ _KNOWN = "a format that `diffract-bake inspect --formats` lists"
 # private tags that only these instruments write on a TIFF's first page
 _PARK_MAGIC_TAG = 50432
 _JPK_FORMAT_TAG = 0x8000
+# an attribute that only JPK's HDF5 files have
+_JPK_GRID = "position-pattern.grid.ilength"
 _HEAD_BYTES = 4096
 # binary formats without first bytes of their own
 _BY_SUFFIX = {".plu": "plu", ".apx": "plu", ".nms": "nms"}
@@ -88,10 +90,14 @@ _BY_SUFFIX = {".plu": "plu", ".apx": "plu", ".nms": "nms"}
 _BY_MEMBER = (
     ("main.xml", "x3p"),
     ("index.xml", "plux"),
-    ("xl/workbook.xml", "mitutoyo"),
-    ("header.properties", "force"),
 )
-_BY_ZIP_SUFFIX = {".qep": "qep", ".poir": "poir", ".x3p": "x3p", ".plux": "plux"}
+# member of a zip that only one format has, which is not read -> name, remedy
+_REFUSED_BY_MEMBER = (
+    ("xl/workbook.xml", "an Excel workbook", "save the sheet with the heights as .csv"),
+    ("header.properties", "JPK force curves, which are not read", EXPORT),
+    ("Kontur1.prf", "a line profile of Mahr (.qep)", "take an areal scan"),
+)
+_BY_ZIP_SUFFIX = {".poir": "poir", ".x3p": "x3p", ".plux": "plux"}
 
 
 def sniff(path: Path) -> str:
@@ -168,21 +174,26 @@ def _zip_kind(path: Path) -> str:
         names = []
     found = _BY_ZIP_SUFFIX.get(path.suffix.lower())
     found = found or next((key for member, key in _BY_MEMBER if member in names or f"./{member}" in names), None)
-    if found == "force":
-        raise fault(path.name, _KNOWN, "JPK force curves, which are not read", EXPORT)
+    for member, refused, way_out in _REFUSED_BY_MEMBER:
+        if found is None and member in names:
+            raise fault(path.name, _KNOWN, refused, way_out)
     if found is None and any(name.endswith(".dsc") for name in names):
         return "nmm"
     return found or "npz"
 
 
 def _hdf5_kind(path: Path) -> str:
-    """Tells HDF5 files apart: Zygo's have their own group; others are read as arrays without units."""
+    """Tells HDF5 files apart by the entries of three instruments; others are read as arrays without units."""
     with third_party(path.name, "an HDF5 file", "h5py"):
         import h5py
 
         with h5py.File(path, "r") as opened:
             if "MetaData" in opened:
                 return "datx"
+            if "nsf_file_version_major" in opened.attrs:
+                return "nhf"
+            if "Measurement_000" in opened and _JPK_GRID in opened["Measurement_000"].attrs:
+                return "h5jpk"
     return "nc" if path.suffix.lower() == ".nc" else "h5"
 
 

@@ -29,7 +29,9 @@ from pipeline.surface.readers.formats import BY_LIBRARY, LIBRARY
 from pipeline.surface.scan import Scan
 
 _LIBRARY = LIBRARY
-_ARRAYS = ("h5", "mat")
+# arrays lie as in .npy, and the library takes their first axis for x; it takes a line of Wyko's text for a row, which
+# is a column of the image, from the bottom (Gwyddion's opdfile.c)
+_TRANSPOSED = ("h5", "mat", "asc")
 # tifffile, which it uses, logs faults of damaged files, and logging prints to stderr where no handler is set
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
@@ -47,6 +49,8 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
         candidates = [(c, label, unit) for c, label in maps if (unit := _height_unit(c)) is not None]
         # arrays of HDF5 and MATLAB have no unit
         candidates = candidates or [(c, label, None) for c, label in maps if c.unit is None and c.data_unit is None]
+        if channels and not maps:
+            raise fault(path.name, "a 2-D height map", "line profiles only", "take an areal scan")
         plain = unique_names([label for _, label, _ in candidates])
         names = _names([c for c, _, _ in candidates], [label for _, label, _ in candidates])
         wanted = names[plain.index(channel)] if channel in plain else channel
@@ -55,8 +59,9 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
         check_shape(path.name, chosen.nb_grid_pts[::-1])
         sizes = {} if chosen.physical_sizes is not None else {"physical_sizes": chosen.nb_grid_pts}
         stored = chosen.topography(**sizes).heights()
-        # arrays lie as in .npy; the library takes their first axis for x
-        heights = _filled(stored) if key in _ARRAYS else _heights(stored)
+        heights = _heights(stored, key)
+        if key == "nms":
+            heights[_end_codes(heights, _notes(chosen))] = np.nan
         steps = _steps(path, key, chosen)
         pitch = None if steps is None or unit is None else (steps[0] * unit, steps[1] * unit)
         form = ", ".join((BY_LIBRARY[key], *_direction(chosen)))
@@ -166,19 +171,25 @@ def _height_unit(channel: Any) -> float | None:
     return micrometres(channel.unit)
 
 
-def _heights(stored: Any) -> NDArray[np.float64]:
+def _heights(stored: Any, key: str) -> NDArray[np.float64]:
     """Converts the library's array, whose first axis is x, to heights (ny, nx) with y upwards and NaN for holes.
 
-    The library turns every format so that heights().T is the image with the top row first. This was compared with the
-    preview inside a Park file (heights().T), and with another program's reading of a Nanoscope file, which stores the
-    bottom line first (heights().T[::-1]).
+    The library turns nearly every format so that heights().T is the image with the top row first. This was compared
+    with the preview inside a Park file, and with Gwyddion's reading of fifteen other formats.
     """
-    return np.ascontiguousarray(_filled(stored).T[::-1])
+    # it masks the samples that a format marks as not measured
+    filled = np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan)
+    return np.ascontiguousarray(filled if key in _TRANSPOSED else filled.T[::-1])
 
 
-def _filled(stored: Any) -> NDArray[np.float64]:
-    """Fills the samples that the library masks with NaN."""
-    return np.ascontiguousarray(np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan))
+def _end_codes(heights: NDArray[np.float64], header: dict[str, Any]) -> NDArray[np.bool_]:
+    """Marks the samples of a NanoFocus file with its lowest or highest code.
+
+    Its heights have 65534 steps in 65536 codes. No published layout says whether the lowest or the highest code marks
+    voids; of the measured heights, only the extreme one has it.
+    """
+    codes = np.rint((heights - header["zmin"]) / (header["zmax"] - header["zmin"]) * 65534)
+    return np.asarray((codes == 0) | (codes == 65535))
 
 
 def _steps(path: Path, key: str, channel: Any) -> tuple[float, float] | None:
@@ -188,6 +199,8 @@ def _steps(path: Path, key: str, channel: Any) -> tuple[float, float] | None:
     notes = _notes(channel)
     nx, ny = (int(n) for n in channel.nb_grid_pts)
     size_x, size_y = (float(size) for size in channel.physical_sizes)
+    if key == "asc":
+        return size_y / ny, size_x / nx
     size_x, size_y = _field(size_x, nx, notes.get("FastScanSize")), _field(size_y, ny, notes.get("SlowScanSize"))
     if key == "di":
         size_y = nanoscope.slow_size((size_x, size_y), (nx, ny), notes, nanoscope.scan_list(path))
