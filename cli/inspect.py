@@ -98,6 +98,7 @@ def _scan(path: Path, channel: str | None) -> dict[str, Any]:
     import numpy as np
 
     from pipeline.surface.holes import measured_part
+    from pipeline.surface.load import refusals
     from pipeline.surface.readers import read_scan
 
     scan = read_scan(path, channel)
@@ -120,6 +121,6 @@ def _scan(path: Path, channel: str | None) -> dict[str, Any]:
         "mask covers": measured.masked_share,
         "lowest": float(valid.min()) if valid.size else None,
         "highest": float(valid.max()) if valid.size else None,
-        "warnings": list(measured.warnings),
+        "warnings": [*measured.warnings, *refusals(path.name, scan, measured)],
         "config needs": [key for key, needed in needs.items() if needed],
     }

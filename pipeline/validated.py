@@ -1,5 +1,6 @@
 """The base class and the field types of config sections, which are validated when they are made."""
 
+import os
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo
@@ -42,6 +43,9 @@ def existing_file(name: str, info: ValidationInfo) -> str:
     # before Python 3.13, a loop of symbolic links is a RuntimeError
     except (OSError, RuntimeError) as error:
         raise ValueError(f"cannot be read: {error}") from None
+    if path.is_dir():
+        raise ValueError(f"expected a file, got a folder: {path}")
     if not found:
-        raise ValueError(f"no such file: {path} (paths are relative to the config)")
+        remedy = "; write / between folders" if "\\" in name and os.sep != "\\" else ""
+        raise ValueError(f"no such file: {path} (paths are relative to the config{remedy})")
     return str(path)

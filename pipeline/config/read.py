@@ -1,5 +1,6 @@
 """Reads config files. All faults of a file are reported at once, each with the path of its key."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, get_args
@@ -13,6 +14,9 @@ from pipeline.surface.recipes.parameters import Recipe
 
 _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
 
+# a place in a message of tomllib
+_LINE = re.compile(r"at line (\d+)")
+
 
 def load(path: Path) -> Config:
     """Reads a config from a TOML file, and resolves relative file names against its folder.
@@ -21,16 +25,27 @@ def load(path: Path) -> Config:
     """
     source = str(path)
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise ConfigError(source, [("", "no such config file")]) from None
     except (OSError, UnicodeDecodeError) as error:
         hint = "a config is a TOML text; for a scan see `diffract-bake inspect`"
         raise ConfigError(source, [("", f"cannot be read as UTF-8 text ({error}); {hint}")]) from None
+    try:
+        document = tomllib.loads(text)
     # TOMLDecodeError, and Python's own limits on digits and on depth
     except (ValueError, RecursionError) as error:
-        raise ConfigError(source, [("", f"not valid TOML: {error}")]) from None
+        raise ConfigError(source, [("", f"not valid TOML: {error}{_hint(text, error)}")]) from None
     return parse(document, source, path.resolve().parent)
+
+
+def _hint(text: str, error: Exception) -> str:
+    """Suggests how to write a path with backslashes, which begin an escape between double quotes."""
+    place = _LINE.search(str(error))
+    lines = text.splitlines()
+    if place is None or "\\" not in "".join(lines[int(place[1]) - 1 : int(place[1])]):
+        return ""
+    return "; in a path, write / instead of \\, or set the path between single quotes"
 
 
 def parse(document: dict[str, Any], source: str, folder: Path) -> Config:

@@ -1,5 +1,6 @@
 """Loads a scan file as a height field in micrometres, with its values and units checked."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -7,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.errors import InputError
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.holes import Measured, Unmeasured, far_apart, measured_part
 from pipeline.surface.readers import read_scan
@@ -101,6 +103,35 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
     return field, record
 
 
+def refusals(file: str, scan: Scan, measured: Measured) -> list[str]:
+    """Lists the reasons for which `load_scan` refuses a scan with the default settings, apart from missing units.
+
+    file: its name. scan: as read. measured: its measured part.
+    Returns one sentence for each; none where a bake can start.
+    """
+    largest_share: float = SurfaceSource.model_fields["max_hole_share"].default
+    checks: list[Callable[[], None]] = [
+        lambda: _check_values(file, scan.heights),
+        lambda: _check_holes(file, measured, largest_share),
+    ]
+    if np.isfinite(measured.heights).any():
+        checks.append(lambda: _check_varies(file, measured.heights))
+    if scan.pitch_um is not None:
+        pitch_um = scan.pitch_um
+        checks.append(lambda: _check_pitch(file, pitch_um))
+    if scan.um_per_unit is not None and np.isfinite(measured.heights).any():
+        unit: tuple[float, Origin] = scan.um_per_unit, "file"
+        checks.append(lambda: _check_range(file, measured.heights * unit[0], unit, is_image=False))
+    found = []
+    for check in checks:
+        try:
+            check()
+        except InputError as error:
+            found.append(str(error))
+    # a constant height is outside of the allowed ranges, too
+    return list(dict.fromkeys(found))
+
+
 # --- values ------------------------------------------------------------------------------------------
 
 
@@ -146,15 +177,19 @@ def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:
         )
 
 
-def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Origin], is_image: bool) -> None:
-    found = float(np.nanmax(heights_um) - np.nanmin(heights_um))
-    if found == 0.0:
+def _check_varies(file: str, heights: NDArray[np.float64]) -> None:
+    if np.nanmax(heights) == np.nanmin(heights):
         raise fault(
             file,
             "heights that vary",
             "the same height everywhere",
             "for a mirror use surface.recipe = { kind = 'mirror' }",
         )
+
+
+def _check_range(file: str, heights_um: NDArray[np.float64], unit: tuple[float, Origin], is_image: bool) -> None:
+    _check_varies(file, heights_um)
+    found = float(np.nanmax(heights_um) - np.nanmin(heights_um))
     low, high = _RANGE_UM
     if not low <= found <= high:
         key = "surface.height_range_um" if is_image else "surface.height_unit"

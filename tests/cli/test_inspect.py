@@ -100,6 +100,18 @@ def test_a_bundle(baked: Tool) -> None:
     assert "licence          not stated" in baked("inspect", baked.bundle()).stdout
 
 
+def test_a_scan_that_run_refuses_says_so(tool: Tool) -> None:
+    np.save(tool.folder / "flat.npy", np.full((32, 32), 3.0))
+    (flat,) = tool("inspect", "flat.npy", "--json").json["warnings"]
+    assert flat.startswith("flat.npy: expected heights that vary, found the same height everywhere; for a mirror use")
+    heights = "\n".join(" ".join(f"{(i * j) % 7}" for j in range(32)) for i in range(32))
+    (tool.folder / "far.txt").write_text(f"# Width: 32 m\n# Height: 32 m\n# Value units: nm\n{heights}\n")
+    (far,) = tool("inspect", "far.txt", "--json").json["warnings"]
+    assert "expected a pitch within 0.0001..100 um, found 1e+06 x 1e+06 um" in far
+    np.save(tool.folder / "good.npy", np.arange(1024.0).reshape(32, 32))
+    assert tool("inspect", "good.npy", "--json").json["warnings"] == []
+
+
 def test_files_that_cannot_be_inspected(tool: Tool) -> None:
     assert tool("inspect", "none").code == 2
     assert tool("inspect", tool.folder).code == 6

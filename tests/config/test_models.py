@@ -210,7 +210,8 @@ def test_every_fault_is_reported_at_once(tmp_path):
         (with_section("surface", recipe={"kind": "cd", "mirror": 1}), "surface.recipe.mirror", "unknown key"),
         (with_section("surface", gaussian={}), "surface.gaussian", "unknown key"),
         (with_section("table", float=1), "table.float", "unknown key"),
-        (with_section("surface", path="."), "surface.path", "no such file"),
+        (with_section("surface", path="."), "surface.path", "expected a file, got a folder"),
+        (with_section("surface", path="C:\\scans\\a.txt"), "surface.path", "write / between folders"),
         (with_section("surface", path="a\0b"), "surface.path", "null"),
         (with_section("surface", path="x" * 5000), "surface.path", "cannot be read"),
         (with_section("spectrum", illuminant="nowhere.CSV"), "spectrum.illuminant", "no such file"),
@@ -323,12 +324,13 @@ def test_the_same_light_may_be_written_differently(scene, render):
     ("data", "said"),
     [
         (b"name = ", "not valid TOML"),
+        (b'[surface]\npath = "C:\\Users\\me\\scan.txt"\n', "in a path, write / instead of"),
         (b'name = "a"\nname = "b"\n', "not valid TOML"),
         (b"name = " + b"9" * 5000, "not valid TOML"),
         (b"name = " + b"[" * 100_000, "not valid TOML"),
         (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "UTF-8"),
     ],
-    ids=["syntax", "key twice", "endless number", "endless nesting", "binary"],
+    ids=["syntax", "backslashes", "key twice", "endless number", "endless nesting", "binary"],
 )
 def test_a_file_that_is_no_toml_is_a_config_fault(tmp_path, data, said):
     """The file is named, with what kept it from being read."""
