@@ -390,3 +390,10 @@ def test_binary_data_behind_any_text_is_said(tmp_path: Path, header: bytes) -> N
         read_scan(path, None)
     assert "remove that line" not in str(caught.value)
     assert "binary data behind a text header" in str(caught.value) or "unknown content" in str(caught.value)
+
+
+def test_separators_of_thousands_are_named(tmp_path: Path) -> None:
+    """Where a comma is the decimal point, 19,993.3 is no number; NaN in its place would lose a height."""
+    rows = "\n".join(";".join(f"{20000 + v:,.1f}" for v in row) for row in TOP_FIRST)
+    message = message_of(save(tmp_path, rows + "\n"), pitch_um=0.1, height_unit="nm")
+    assert "where a comma is the decimal point; export them without separators of thousands" in message

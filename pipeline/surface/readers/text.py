@@ -299,6 +299,10 @@ def _uneven(path: Path, content: _Content, rows: list[str], cause: str) -> Excep
     usual = max(set(lengths), key=lengths.count) if len(set(lengths)) > 1 else lengths[0]
     odd = next((i for i, length in enumerate(lengths) if length != usual), None)
     if odd is None:
+        grouped = next((cell for row in rows for cell in _cells(row, content.separator) if cell.count(".") > 1), None)
+        if content.decimal_comma and grouped is not None:
+            found = f"{one_line(grouped, 30)!r} where a comma is the decimal point"
+            return fault(path.name, "numbers", found, "export them without separators of thousands")
         return fault(path.name, "rows of numbers", one_line(cause, 80), _WRITE_NAN)
     found = f"{lengths[odd]} in line {content.numbers[odd]} where others have {usual}"
     way_out = {0: _MARK, len(rows) - 1: _CUT}.get(odd, _WRITE_NAN)
