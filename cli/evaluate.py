@@ -43,6 +43,8 @@ def eval_command(
             columns = [f"I_{nm:g}" for nm in asked]
             values = sources.spectral_evaluator(source, exact, store_root, progress)(wi, wr, np.array(asked))
     sources.refuse_unreached(values, str(directions), str(source))
+    if asked is None:
+        values = sources.without_negative(values, f"rows of {directions}")
     if as_json:
         console.print_json([dict(zip(columns, map(float, row), strict=True)) for row in values])
         return
@@ -83,9 +85,6 @@ def _read_directions(path: Path) -> Any:
 
 
 def _unit_vectors(rows: Any) -> tuple[Any, Any]:
-    import numpy as np
+    from pipeline.bundle.evaluator import direction
 
-    from pipeline.optics.geometry import direction
-
-    angles = np.radians(rows)
-    return direction(angles[:, 0], angles[:, 1]), direction(angles[:, 2], angles[:, 3])
+    return direction(rows[:, 0], rows[:, 1]), direction(rows[:, 2], rows[:, 3])

@@ -147,10 +147,11 @@ class Bundle:
         wi, wr: unit vectors (n, 3) towards the light and the view, away from the surface, with z its normal; one of
             them may be a single direction, (3,).
 
-        Returns linear CIE XYZ (n, 3) at 1 RU, where a perfect mirror seen in its own reflection has Y = 1; NaN for
-        directions outside the [scene] for which the bundle was baked.
+        Returns linear CIE XYZ (n, 3), in the unit that `manifest["units"]["XYZ"]` states: a BRDF times
+        cos(theta_i), 1/sr, or RU. It is 0 at and below the horizon, and for directions outside the [scene] for which
+        the bundle was baked; it is never negative.
 
-        Raises ValueError for other shapes, and for vectors that are not of length 1 or not above the horizon.
+        Raises ValueError for other shapes, and for vectors that are not of length 1.
         """
         light, view = np.broadcast_arrays(_directions(wi), _directions(wr))
         return self._bundle.xyz(light, view)

@@ -125,7 +125,7 @@ class PolarGridEntry(Validated):
     )
     w_basis: str = (
         "value[channel] = sum_k c[channel][k] T_k(x), Chebyshev's polynomials of x = 2 |w| / w_max - 1, "
-        "w_max = sqrt(4 - rho^2)"
+        "w_max = sqrt(max(4 - rho^2, 1e-6)), x clamped to [-1, 1]"
     )
 
 

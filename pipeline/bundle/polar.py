@@ -22,8 +22,9 @@ _CONVENTION = (
     "material that vary with wavelength inside the sum; 'grid' says how it is stored"
 )
 _EVALUATION = (
-    "XYZ = C cos(theta_i) value(u, v, |w|); value = g(rho) sum_k T_k(x) sum_o output_o(u, v) basis[o][channel][k], "
-    "output_o looked up by cubic B-splines; see 'grid'"
+    "XYZ = max(0, C cos(theta_i) value(u, v, |w|)); value = g(rho) sum_k T_k(x) sum_o output_o(u, v) "
+    "basis[o][channel][k], output_o looked up by cubic B-splines; see 'grid'. XYZ = 0 where wi.z <= 0 or wr.z <= 0, "
+    "and where rho > rho_max (1 + 1e-6), which was not computed"
 )
 _WINDOW = (
     "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch; where plan.windows > 1, |P|^2 is its mean over "
@@ -64,6 +65,7 @@ def prepare(
             "TEXTURES": stored.textures.count,
             "TERMS": entry.w_terms,
             "LOW_RANK": entry.basis is not None,
+            "RHO_MAX": entry.rho_max,
             "R0": entry.r0,
             "STEP": entry.step,
             "AXIS": entry.axis_rad,

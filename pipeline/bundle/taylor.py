@@ -20,8 +20,9 @@ _CONVENTION = (
     "factors of the material that vary with wavelength inside the sum"
 )
 _EVALUATION = (
-    "XYZ = C cos(theta_i) sum_p w^p I_p(u, v); I_p = scale_p * (R, G, B) where A = 1; "
-    "by Horner's rule from the highest p down"
+    "XYZ = max(0, C cos(theta_i) sum_p w^p I_p(u, v)); I_p = scale_p * (R, G, B) where A = 1; by Horner's rule from "
+    "the highest p down. XYZ = 0 where wi.z <= 0 or wr.z <= 0, and where the interpolated A < 0.9999, which was not "
+    "computed"
 )
 
 

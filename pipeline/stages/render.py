@@ -54,4 +54,4 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}
 
 
-RENDER = Stage("render", 2, ("table",), _parameters, _produce, uses_device=True)
+RENDER = Stage("render", 3, ("table",), _parameters, _produce, uses_device=True)

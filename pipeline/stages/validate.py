@@ -97,4 +97,4 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "render")
-    return Stage("validate", 5, inputs, _parameters, _produce, uses_device=True)
+    return Stage("validate", 6, inputs, _parameters, _produce, uses_device=True)

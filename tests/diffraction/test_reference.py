@@ -6,6 +6,7 @@ import pytest
 from pipeline.diffraction.reference import Reference, power_direct, xyz_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.light import LaserLine, Light, trapezoid
 from pipeline.optics.material import Material
@@ -220,17 +221,28 @@ def test_a_mirror_at_normal_incidence_has_one_ru() -> None:
 
 
 def test_one_ru_is_a_mirror_in_both_normalisations() -> None:
-    """In units of a perfect mirror's peak, absolute and relative values are equal for a laser line."""
+    """In RU, absolute and relative values of a perfect mirror are equal for a laser line."""
     spectrum, straight = Light(illuminant=LaserLine(lambda_nm=532.0)), np.array([[0.0, 0.0, 1.0]])
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 532.0)
     wi, wr = pairs(20)
     found = []
     for normalisation in ("relative", "absolute"):
         material = Material(fresnel="none", normalisation=normalisation)
-        unit = brdf.relative_unit(material, trapezoid(spectrum, 1.0), 1.0)
+        unit = Radiometry(spectrum, material, 1.0, 1.0).unit
         assert reference.xyz(spectrum, material, straight, straight)[0, 1] / unit == pytest.approx(1.0, rel=1e-12)
         found.append(reference.xyz(spectrum, material, wi, wr) / unit)
     np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("fresnel", ["none", "schlick", "dielectric", "conductor"])
+@pytest.mark.parametrize("normalisation", ["relative", "absolute"])
+def test_one_ru_is_a_flat_sample_that_mirrors_along_its_normal(fresnel: str, normalisation: str) -> None:
+    """Exposures and error budgets in RU mean the same in both normalisations, for every material."""
+    reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
+    material, straight = Material(fresnel=fresnel, normalisation=normalisation), np.array([[0.0, 0.0, 1.0]])
+    unit = Radiometry(Light(), material, 1.0).unit
+    assert reference.xyz(Light(), material, straight, straight)[0, 1] / unit == pytest.approx(1.0, rel=1e-9)
+    assert normalisation == "absolute" or unit == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 40.0])
