@@ -27,9 +27,12 @@ from cli import console, sources
 def eval_command(
     source: Path, directions: Path, exact: bool, wavelengths: str | None, store_root: Path | None, as_json: bool
 ) -> None:
-    """Print X,Y,Z at 1 RU for rows of directions, from SOURCE: a bundle's folder or a config.
+    """Print X,Y,Z for rows of directions, from SOURCE: a bundle's folder or a config.
 
-    Directions point away from the surface; theta is measured from its normal, phi from +x.
+    They are a BRDF times cos(theta_i) in 1/sr, or in RU where material.normalisation is "relative".
+
+    Directions point away from the surface; theta is measured from its normal, phi from +x. At and below the horizon,
+    theta >= 90, nothing is reflected.
     """
     import numpy as np
 

@@ -31,7 +31,7 @@ def render_command(
     """Render BRDF maps of CONFIG for its own lights, or for one given by --theta and --phi.
 
     A map shows all views under one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files are
-    written to OUT/NAME as EXR (linear XYZ at 1 RU) and PNG.
+    written to OUT/NAME as EXR (linear XYZ) and PNG.
     """
     from pipeline.optics.colour import pixels
     from pipeline.optics.scene import Direction

@@ -55,7 +55,7 @@ class Baked:
     """The files that a bake wrote, and the errors of its table against the exact sum.
 
     name: the config's. bundle: the bundle's folder. report: an HTML page.
-    maps: for each light, its BRDF map as an EXR (linear XYZ at 1 RU) and as a PNG.
+    maps: for each light, its BRDF map as an EXR (linear XYZ) and as a PNG.
     measured_error: errors of the table, as in manifest.json.
     certificate: errors of the table on random directions that its planning did not use, as in manifest.json.
     """

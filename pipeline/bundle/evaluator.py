@@ -3,8 +3,8 @@
     python evaluate.py directions.csv
 
 reads rows of theta_i,phi_i,theta_r,phi_r (light, view; degrees), prints X,Y,Z: linear, not sRGB.
-X,Y,Z are in the unit that manifest.json states. Directions point away from the surface, z is its normal.
-Values are 0 at and below the horizon, where the table was not computed (counted on stderr), and never negative.
+X,Y,Z are in the unit that manifest.json states.
+Directions point away from the surface, z is its normal. Values below the horizon, not computed or negative are 0.
 """
 
 import json

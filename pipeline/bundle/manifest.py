@@ -53,12 +53,18 @@ TableImage = Annotated[TaylorImage | PolarImage, Field(discriminator="layout")]
 
 
 class MapImage(Image):
-    """The BRDF map of one light: XYZ at 1 RU, and a picture at an exposure."""
+    """The BRDF map of one light: XYZ, and an sRGB picture at an exposure, RU.
+
+    negative_share: of the views, those with a negative channel, which was set to 0.
+    clipped_share: of the views, those whose colour at the exposure is outside the gamut of sRGB or above its white.
+    """
 
     theta_deg: float
     phi_deg: float
     png: str
     exposure_ru: float
+    negative_share: float
+    clipped_share: float
 
 
 # --- grids ---------------------------------------------------------------------------------------------
@@ -179,6 +185,7 @@ class Colour(Validated):
     """The colour space of all numbers.
 
     wavelengths: number in the spectral integral, the largest of all rings. step_nm: None where each ring has its own.
+    mirror_y: Y of 1 RU, of a flat sample of the material along its normal, in its own reflection.
     """
 
     space: str = "CIE XYZ, linear (not sRGB)"
@@ -187,7 +194,10 @@ class Colour(Validated):
     range_nm: list[float]
     step_nm: float | None
     wavelengths: int
-    white: str = "a perfect mirror in its own reflection has Y = 1 at 1 RU ('relative'); X and Z are the illuminant's"
+    normalisation: Literal["relative", "absolute"]
+    white: str
+    mirror_y: Normal
+    exposure: str = "a picture at an exposure of E RU shows XYZ E / mirror_y in sRGB, clipped to its gamut"
 
 
 class Coverage(Validated):
@@ -195,7 +205,8 @@ class Coverage(Validated):
 
     unknown_share: share of the light in the (u, v) disc beyond the scan's Nyquist limits, which counts as dark.
     skipped_share: share of the disc that is not computed, because no light and view of the scene reach it.
-    known_radius: sqrt(u^2 + v^2) up to which every wavelength lies within the Nyquist limits, at most 2.
+    known_radius: sqrt(u^2 + v^2) up to which the table was computed and every wavelength lies within the Nyquist
+    limits.
     band_limit_per_um: the Nyquist limits along x and y, 1/um.
     """
 

@@ -59,6 +59,7 @@ def prepare(
         plan=plan,
         certificate=TypeAdapter(Certificate).validate_python(certificate),
         loss=loss,
+        rho_max=entry.rho_max,
         constants={
             "RINGS": entry.height,
             "AZIMUTHS": entry.width,

@@ -27,6 +27,7 @@ def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
         f"{layout}.md.in",
         manifest=manifest,
         grid=manifest.grid,
+        rho_max=getattr(manifest.grid, "rho_max", 2.0),
         tables=len(manifest.tables),
         material=manifest.material,
         reflectance=manifest.material.reflectance_table,

@@ -50,6 +50,7 @@ def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificat
         plan=plan,
         certificate=TypeAdapter(Certificate).validate_python(certificate),
         loss=loss,
+        rho_max=grid.U_MAX,
         constants={"POWERS": len(scale), "N": float(entry.width), "A": entry.power},
     )
 

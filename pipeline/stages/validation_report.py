@@ -97,6 +97,8 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         subtitle="Diffraction BRDF: what was baked and how far it is from the exact sum.",
         warnings=surface["warnings"],
         exposure_ru=config.render.exposure_ru,
+        colours=_colour_rows(config),
+        clamped=table["certificate"]["random"]["clamped"],
         maps=[((inputs["render"].folder / light["png"]).read_bytes(), light) for light in render["maps"]],
         surface=_surface_rows(surface),
         settings=layout.settings(inputs.summary(layout.transform.name), table),
@@ -107,6 +109,25 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         pictures=pictures,
         studied=layout.study_remark,
     )
+
+
+def _colour_rows(config: Config) -> Rows:
+    """The meaning of the colours: normalisation, unit, light and material."""
+    absolute, unit = config.material.normalisation == "absolute", config.radiometry.unit
+    illuminant = config.light.illuminant
+    return [
+        ["normalisation", config.material.normalisation],
+        ["X, Y, Z of the maps (EXR)", "a BRDF times cos θi, in 1/sr" if absolute else "in RU"],
+        [
+            "1 RU, a flat sample in its own reflection",
+            f"Y = {unit:.5g}" + (" /sr" if absolute else ""),
+        ],
+        ["pictures (PNG)", "sRGB of X, Y, Z × exposure / (Y of 1 RU), clipped to its gamut"],
+        ["light", illuminant if isinstance(illuminant, str) else f"{illuminant.lambda_nm:g} nm"],
+        ["reflectance", config.material.fresnel],
+        ["stored as", f"{config.publish.precision}, textures: {config.publish.textures}"],
+        ["licence of the scan", config.publish.licence or "not stated"],
+    ]
 
 
 def _relative_error_rows(results: dict[str, Any]) -> Rows:

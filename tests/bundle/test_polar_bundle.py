@@ -128,9 +128,9 @@ def test_a_bundle_has_the_error_that_it_states(
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
     table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
     evaluate = open_bundle(folder).xyz
-    mirror = wi * [-1.0, -1.0, 1.0]
+    mirror, unit = wi * [-1.0, -1.0, 1.0], small("polar").radiometry.unit
     for views, error in ((wr, loss_of(manifest).added), (mirror, loss_of(manifest).added_in_mirror)):
-        found = delta_e(evaluate(wi, views), table(wi, views), error.exposure_ru)
+        found = delta_e(evaluate(wi, views) / unit, table(wi, views) / unit, error.exposure_ru)
         assert found.mean() == pytest.approx(error.mean, rel=1e-2, abs=1e-4)
     assert f"in {textures} of 9 textures" in (folder / "README.md").read_text(encoding="utf-8")
 

@@ -129,7 +129,7 @@ def test_the_power_of_a_direction_does_not_depend_on_the_other_directions() -> N
 
 def test_frequencies_beyond_the_nyquist_limit_count_as_dark() -> None:
     """XYZ of a direction is the integral over the wavelengths within the limit."""
-    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Light(), Material()
+    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Light(), Material(normalisation="relative")
     wi, wr = np.array([[0.0, 0.0, 1.0]]), geometry.direction(np.array([np.radians(65.0)]), np.array([0.0]))
     rule = trapezoid(light, 1.0)
     power = Reference(field, 2.0, 380.0).power(geometry.uvw(wi, wr), rule.lambda_nm)
@@ -216,7 +216,8 @@ def test_a_mirror_at_normal_incidence_has_one_ru() -> None:
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
     straight = np.array([[0.0, 0.0, 1.0]])
     for fresnel in ("none", "schlick", "dielectric", "conductor"):
-        xyz = reference.xyz(Light(), Material(fresnel=fresnel), straight, straight)
+        material = Material(fresnel=fresnel, normalisation="relative")
+        xyz = reference.xyz(Light(), material, straight, straight)
         assert xyz[0, 1] == pytest.approx(1.0, abs=1e-12)
 
 

@@ -86,4 +86,4 @@ def load(artifact: Artifact) -> polar.PolarTable:
     return polar.PolarTable(arrays.load(zarr, "table"), grid)
 
 
-TABLE = Stage("table", 5, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)
+TABLE = Stage("table", 6, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)
