@@ -36,16 +36,18 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
 
 def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
     """Returns a function (wi, wr) -> XYZ, (n, 3) each, of a config, and bakes what it needs."""
-    artifact = _artifact(config, "surface" if exact else "table", store_root, progress)
     if exact:
+        artifact = _artifact(config, "surface", store_root, progress)
         from pipeline.accuracy.exact import reference_evaluator
         from pipeline.stages import surface
 
         return reference_evaluator(surface.load(artifact), config, progress)
     from pipeline import layouts
+    from pipeline.stages.stage import Inputs
     from pipeline.tables.evaluate import interpolator
 
-    return interpolator(layouts.of(config.table).load(artifact), config.radiometry, progress)
+    inputs = Inputs({name: _artifact(config, name, store_root, progress) for name in ("table", "textures")})
+    return interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry, progress)
 
 
 def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:

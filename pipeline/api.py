@@ -117,7 +117,7 @@ def bake(
         report=report,
         maps=tuple(maps),
         measured_error=made.artifacts["validate"].summary,
-        certificate=made.artifacts["table"].summary["certificate"],
+        certificate=made.artifacts["textures"].summary["certificate"],
     )
 
 

@@ -67,11 +67,12 @@ def measure(
     checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(interpolate, reference, config, progress)
     exposure = config.accuracy.exposure_ru
-    _refuse_clamping(random, config)
+    refuse_clamping(random, config)
     return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, checked)
 
 
-def _refuse_clamping(random: RandomCheck, config: Config) -> None:
+def refuse_clamping(random: RandomCheck, config: Config) -> None:
+    """Raises AccuracyError where setting negative values to 0 changes colours by more than [accuracy] allows."""
     budget, clamped = config.accuracy.delta_e, random.clamped
     if budget is not None and clamped.cost.mean > budget:
         raise AccuracyError(

@@ -162,8 +162,9 @@ class PolarLoss(Validated):
 
     textures: number of RGBA textures; `most_textures` would hold the whole table. error: of the stored textures
     against the exact sum. added: against the table as baked. added_in_mirror: the same in the mirror directions of
-    the lights, at 1 RU. subnormal_share: of all values, those that half floats store with fewer than 11 bits; None
-    for float.
+    the lights, at 1 RU. y_in_mirror: relative errors of Y there. mirror_kept: whether `added_in_mirror` is on average
+    below the just noticeable difference, 2.3. subnormal_share: of all values, those that half floats store with fewer
+    than 11 bits; None for float.
     """
 
     layout: Literal["polar"]
@@ -173,6 +174,8 @@ class PolarLoss(Validated):
     error: ColourError
     added: ColourError
     added_in_mirror: ColourError
+    y_in_mirror: RelativeError
+    mirror_kept: bool
     subnormal_share: float | None
 
 

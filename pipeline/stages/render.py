@@ -1,4 +1,4 @@
-"""The stage "render": table -> BRDF maps, one for each light, as EXR and PNG."""
+"""The stage "render": textures -> BRDF maps, one for each light, as EXR and PNG."""
 
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ def map_radius(config: Config) -> float:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    interpolate = interpolator(layouts.of(config.table).table_of(inputs), config.radiometry)
+    interpolate = interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry)
     views, unit = Map(config.render.size, map_radius(config)), config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):
@@ -63,4 +63,4 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}
 
 
-RENDER = Stage("render", 3, ("table",), _parameters, _produce, uses_device=True)
+RENDER = Stage("render", 4, ("table", "textures"), _parameters, _produce, uses_device=True)

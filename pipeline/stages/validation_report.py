@@ -89,6 +89,9 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
     Returns HTML.
     """
     surface, table, render = (inputs.summary(name) for name in ("surface", "table", "render"))
+    # errors are those of the textures that a bundle holds
+    textures = inputs.summary("textures")
+    table = {**table, "certificate": textures["certificate"]}
     layout = layouts.of(config.table)
     return template.html(
         "pipeline.report",
@@ -97,7 +100,7 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         subtitle="Diffraction BRDF: what was baked and how far it is from the exact sum.",
         warnings=surface["warnings"],
         exposure_ru=config.render.exposure_ru,
-        colours=_colour_rows(config),
+        colours=[*_colour_rows(config), *_stored_rows(config, textures["loss"])],
         clamped=table["certificate"]["random"]["clamped"],
         maps=[((inputs["render"].folder / light["png"]).read_bytes(), light) for light in render["maps"]],
         surface=_surface_rows(surface),
@@ -125,8 +128,21 @@ def _colour_rows(config: Config) -> Rows:
         ["pictures (PNG)", "sRGB of X, Y, Z × exposure / (Y of 1 RU), clipped to its gamut"],
         ["light", illuminant if isinstance(illuminant, str) else f"{illuminant.lambda_nm:g} nm"],
         ["reflectance", config.material.fresnel],
-        ["stored as", f"{config.publish.precision}, textures: {config.publish.textures}"],
         ["licence of the scan", config.publish.licence or "not stated"],
+    ]
+
+
+def _stored_rows(config: Config, loss: dict[str, Any] | None) -> Rows:
+    """The precision and number of the textures, and what they change of the table as baked."""
+    if loss is None:
+        return [["stored in", f"{config.publish.precision}, without loss"]]
+    if loss["layout"] == "taylor":
+        return [["stored in", f"half floats, which change colours by at most ΔE {loss['largest_delta_e']:.2g}"]]
+    mirror, verdict = loss["added_in_mirror"]["mean"], "kept" if loss["mirror_kept"] else "visibly changed"
+    return [
+        ["stored in", f"{config.publish.precision}, {loss['textures']} of {loss['most_textures']} textures"],
+        ["mean ΔE that this adds", f"{loss['added']['mean']:.3g} at {loss['added']['exposure_ru']:g} RU"],
+        ["mean ΔE in mirror directions at 1 RU", f"{mirror:.3g}: the highlight is {verdict}"],
     ]
 
 

@@ -80,10 +80,13 @@ def of(inputs: Inputs) -> polar.PolarTable:
 
 def load(artifact: Artifact) -> polar.PolarTable:
     """Reads the table of an artifact of this stage."""
-    zarr = artifact.folder / _FILE
-    found = arrays.attributes(zarr)
-    grid = PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
-    return polar.PolarTable(arrays.load(zarr, "table"), grid)
+    return polar.PolarTable(arrays.load(artifact.folder / _FILE, "table"), grid_of(artifact))
+
+
+def grid_of(artifact: Artifact) -> PolarGrid:
+    """Returns the grid in the record of an artifact of this stage."""
+    found = artifact.summary
+    return PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
 
 
 TABLE = Stage("table", 6, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)
