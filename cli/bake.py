@@ -76,9 +76,9 @@ def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_
         console.print_json(results)
         return
     for result in results:
-        for certificate in (stage["summary"].get("certificate") for stage in result["stages"].values()):
-            if certificate is not None:
-                click.echo(f"{result['name']}: {_certified(certificate)}")
+        found = [stage["summary"].get("certificate") for stage in result["stages"].values()]
+        for certificate in [certificate for certificate in found if certificate is not None][-1:]:
+            click.echo(f"{result['name']}: {_certified(certificate)}")
 
 
 def _certified(certificate: dict[str, Any]) -> str:
@@ -127,7 +127,7 @@ def _bake(config: "Config", out: Path, store_root: Path | None, until: str) -> t
 def _print_result(result: dict[str, Any]) -> None:
     from pipeline.stages.validation_report import ERROR_COLUMNS, error_rows
 
-    click.echo(f"{result['name']}: CIELAB error of the table against the exact sum")
+    click.echo(f"{result['name']}: CIELAB error of the bundle's tables against the exact sum")
     console.print_table(ERROR_COLUMNS, error_rows(result["stages"]["validate"]["summary"]))
     for path in (*result["files"], result["bundle"]):
         if path is not None:

@@ -27,9 +27,12 @@ from cli import console, sources
 def eval_command(
     source: Path, directions: Path, exact: bool, wavelengths: str | None, store_root: Path | None, as_json: bool
 ) -> None:
-    """Print X,Y,Z at 1 RU for rows of directions, from SOURCE: a bundle's folder or a config.
+    """Print X,Y,Z for rows of directions, from SOURCE: a bundle's folder or a config.
 
-    Directions point away from the surface; theta is measured from its normal, phi from +x.
+    They are a BRDF times cos(theta_i) in 1/sr, or in RU where material.normalisation is "relative".
+
+    Directions point away from the surface; theta is measured from its normal, phi from +x. At and below the horizon,
+    theta >= 90, nothing is reflected.
     """
     import numpy as np
 
@@ -43,6 +46,8 @@ def eval_command(
             columns = [f"I_{nm:g}" for nm in asked]
             values = sources.spectral_evaluator(source, exact, store_root, progress)(wi, wr, np.array(asked))
     sources.refuse_unreached(values, str(directions), str(source))
+    if asked is None:
+        values = sources.without_negative(values, f"rows of {directions}")
     if as_json:
         console.print_json([dict(zip(columns, map(float, row), strict=True)) for row in values])
         return
@@ -83,9 +88,6 @@ def _read_directions(path: Path) -> Any:
 
 
 def _unit_vectors(rows: Any) -> tuple[Any, Any]:
-    import numpy as np
+    from pipeline.bundle.evaluator import direction
 
-    from pipeline.optics.geometry import direction
-
-    angles = np.radians(rows)
-    return direction(angles[:, 0], angles[:, 1]), direction(angles[:, 2], angles[:, 3])
+    return direction(rows[:, 0], rows[:, 1]), direction(rows[:, 2], rows[:, 3])

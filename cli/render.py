@@ -31,7 +31,7 @@ def render_command(
     """Render BRDF maps of CONFIG for its own lights, or for one given by --theta and --phi.
 
     A map shows all views under one light: pixel (x, y) is the direction (sin t cos p, sin t sin p), +y up. Files are
-    written to OUT/NAME as EXR (linear XYZ at 1 RU) and PNG.
+    written to OUT/NAME as EXR (linear XYZ) and PNG.
     """
     from pipeline.optics.colour import pixels
     from pipeline.optics.scene import Direction
@@ -51,7 +51,9 @@ def render_command(
         evaluate = sources.config_evaluator(config, exact, store_root, progress)
         shown = [render_map(evaluate, render.light_direction(light), views) for light in lights]
     for light, image in zip(lights, shown, strict=True):
-        sources.refuse_unreached(image, f"the light {light.theta_deg:g}°, {light.phi_deg:g}°", str(config_path))
+        named = f"the light {light.theta_deg:g}°, {light.phi_deg:g}°"
+        sources.refuse_unreached(image, named, str(config_path))
+        image[...] = sources.without_negative(image, f"pixels of {named}")
     with writing(folder), scratch.replacing(folder) as temporary:
         for light, image in zip(lights, shown, strict=True):
             name = render.map_name(light) + ("_exact" if exact else "")

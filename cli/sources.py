@@ -21,6 +21,8 @@ def load(path: Path) -> Any:
 def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
     """Returns a function (wi, wr) -> XYZ, (n, 3) each, from SOURCE, a bundle's folder or a config.
 
+    Values of a table may be negative, and are NaN outside its scene.
+
     exact: whether the exact reference is used; only a config has one. Raises click.UsageError for a bundle.
     """
     if source.is_dir():
@@ -28,22 +30,24 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
             raise click.UsageError("--exact needs a config: a bundle holds tables, not the surface")
         from pipeline.bundle.verify import open_bundle
 
-        return open_bundle(source).xyz
+        return open_bundle(source).signed
     return config_evaluator(load(source), exact, store_root, progress)
 
 
 def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
     """Returns a function (wi, wr) -> XYZ, (n, 3) each, of a config, and bakes what it needs."""
-    artifact = _artifact(config, "surface" if exact else "table", store_root, progress)
     if exact:
+        artifact = _artifact(config, "surface", store_root, progress)
         from pipeline.accuracy.exact import reference_evaluator
         from pipeline.stages import surface
 
         return reference_evaluator(surface.load(artifact), config, progress)
     from pipeline import layouts
-    from pipeline.tables.evaluate import table_evaluator
+    from pipeline.stages.stage import Inputs
+    from pipeline.tables.evaluate import interpolator
 
-    return table_evaluator(layouts.of(config.table).load(artifact), config.radiometry, progress)
+    inputs = Inputs({name: _artifact(config, name, store_root, progress) for name in ("table", "textures")})
+    return interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry, progress)
 
 
 def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:
@@ -78,6 +82,18 @@ def _artifact(config: Any, stage: str, store_root: Path | None, progress: Any) -
     steps = run.plan(config, store, stage)
     artifacts = run.execute(config, steps, store, progress, console.warning_reporter(config, store))
     return store.open(stage, artifacts[stage].key)
+
+
+def without_negative(xyz: Any, what: str) -> Any:
+    """Sets negative values of XYZ (..., 3) to 0, and notes how many of `what` this concerns."""
+    import numpy as np
+
+    from pipeline.tables.evaluate import never_negative
+
+    negative = int(np.sum(np.any(xyz < 0.0, axis=-1)))
+    if negative:
+        console.note(f"{negative} of {xyz[..., 0].size} {what} were negative between texels, now 0")
+    return never_negative(xyz)
 
 
 def refuse_unreached(xyz: Any, what: str, source: str) -> None:

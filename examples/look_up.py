@@ -19,7 +19,7 @@ VIEWS_DEG = np.array([-60.0, -45.0, -30.0, -15.0, 0.0, 15.0])
 
 def main(folder: Path) -> None:
     bundle = Bundle(folder)
-    print(f"# {bundle.manifest['name']} {bundle.manifest['version']}: linear XYZ at 1 RU")
+    print(f"# {bundle.manifest['name']} {bundle.manifest['version']}: linear XYZ, {bundle.manifest['units']['XYZ']}")
     light = direction(np.radians(LIGHT_DEG), 0.0)
     views = direction(np.radians(np.abs(VIEWS_DEG)), np.where(VIEWS_DEG < 0, np.pi, 0.0))
     print("theta_r,X,Y,Z")

@@ -55,7 +55,7 @@ class Baked:
     """The files that a bake wrote, and the errors of its table against the exact sum.
 
     name: the config's. bundle: the bundle's folder. report: an HTML page.
-    maps: for each light, its BRDF map as an EXR (linear XYZ at 1 RU) and as a PNG.
+    maps: for each light, its BRDF map as an EXR (linear XYZ) and as a PNG.
     measured_error: errors of the table, as in manifest.json.
     certificate: errors of the table on random directions that its planning did not use, as in manifest.json.
     """
@@ -117,7 +117,7 @@ def bake(
         report=report,
         maps=tuple(maps),
         measured_error=made.artifacts["validate"].summary,
-        certificate=made.artifacts["table"].summary["certificate"],
+        certificate=made.artifacts["textures"].summary["certificate"],
     )
 
 
@@ -147,10 +147,11 @@ class Bundle:
         wi, wr: unit vectors (n, 3) towards the light and the view, away from the surface, with z its normal; one of
             them may be a single direction, (3,).
 
-        Returns linear CIE XYZ (n, 3) at 1 RU, where a perfect mirror seen in its own reflection has Y = 1; NaN for
-        directions outside the [scene] for which the bundle was baked.
+        Returns linear CIE XYZ (n, 3), in the unit that `manifest["units"]["XYZ"]` states: a BRDF times
+        cos(theta_i), 1/sr, or RU. It is 0 at and below the horizon, and for directions outside the [scene] for which
+        the bundle was baked; it is never negative.
 
-        Raises ValueError for other shapes, and for vectors that are not of length 1 or not above the horizon.
+        Raises ValueError for other shapes, and for vectors that are not of length 1.
         """
         light, view = np.broadcast_arrays(_directions(wi), _directions(wr))
         return self._bundle.xyz(light, view)

@@ -1,7 +1,6 @@
 /* Look up a polar diffraction table, in GLSL 3.30 and later or GLSL ES 3.00 and later.
  *
- * Put `#version` before it and the material's factor C after it. A bundle's README has it with the constants of its own
- * table. */
+ * Put `#version` before it and brdf.glsl after it. A bundle's README has both with the constants of its own table. */
 precision highp float;
 precision highp int;
 precision highp sampler2DArray;
@@ -11,6 +10,7 @@ const int AZIMUTHS = 640;  // columns of an image
 const int TEXTURES = 6;  // images
 const int TERMS = 8;  // Chebyshev polynomials in |w|
 const bool LOW_RANK = false;  // true: `basis` mixes outputs; false: each output is one term of one channel
+const float RHO_MAX = 2.0;  // of the last ring; beyond it, nothing was computed
 const float R0 = 0.05;
 const float STEP = 0.0318;
 const float AXIS = 0.0;  // (u', v') is (u, v) turned by -AXIS, radians
@@ -22,9 +22,6 @@ uniform sampler2DArray tables;  // layer q is image q, as data
 uniform float scale[4 * TEXTURES];  // of output o, manifest.json: tables[o / 4].scale[o % 4]
 // of output o and term k at [o * TERMS + k], manifest.json: grid.basis[o][0..2][k]
 uniform vec3 basis[LOW_RANK ? 4 * TEXTURES * TERMS : 1];
-
-// The material's factor, whose formula and numbers are in manifest.json: material.
-float C(vec3 wi, vec3 wr);
 
 // The weights of a cubic B-spline's four texels, t in [0, 1] being the place between the second and the third.
 vec4 spline(float t) {
@@ -42,9 +39,10 @@ ivec2 texel(int ring, int azimuth) {
     return ivec2((azimuth + AZIMUTHS) % AZIMUTHS, ring);
 }
 
-// X, Y, Z at (u, v, w) = -wi - wr, without the material's factor and cos(theta_i).
+// X, Y, Z at (u, v, w) = -wi - wr, without C cos(theta_i); 0 where nothing was computed.
 vec3 table_value(vec3 uvw) {
     float rho = length(uvw.xy);
+    if (rho > RHO_MAX * 1.000001) return vec3(0.0);
     vec2 turned = mat2(cos(AXIS), -sin(AXIS), sin(AXIS), cos(AXIS)) * uvw.xy;
     float ring = min(asinh(rho / R0) / STEP, float(RINGS - 1));
     float turn = rho > 0.0 ? atan(turned.y, STRETCH * turned.x) / 6.28318531 : 0.0;
@@ -73,9 +71,4 @@ vec3 table_value(vec3 uvw) {
         value += scale[o] * found[o / 4][o % 4] * shape;
     }
     return value * pow(1.0 + rho * rho / (ENVELOPE_RADIUS * ENVELOPE_RADIUS), -ENVELOPE_EXPONENT);
-}
-
-// XYZ under 1 RU for unit vectors towards the light and the viewer, z > 0 in both.
-vec3 diffraction(vec3 wi, vec3 wr) {
-    return C(wi, wr) * wi.z * table_value(-wi - wr);
 }

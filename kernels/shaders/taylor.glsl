@@ -1,7 +1,7 @@
 /* Look up the diffraction tables I_p of Dhillon et al. 2014, in GLSL 3.30 and later or GLSL ES 3.00 and later.
  *
- * Put `#version` before it and the material's factor C after it. A bundle's README has it with the constants of its own
- * tables. The sum cancels: keep it in float32, never in half. */
+ * Put `#version` before it and brdf.glsl after it. A bundle's README has both with the constants of its own tables. The
+ * sum cancels: keep it in float32, never in half. */
 precision highp float;
 precision highp int;
 precision highp sampler2DArray;
@@ -13,25 +13,18 @@ const float A = 5.0;  // exponent of the grid: u = 2 |t|^A sign(t)
 uniform sampler2DArray I;  // layer p holds I_p / scale[p], as data, bilinear, clamped to the edge
 uniform float scale[POWERS];  // manifest.json: tables[p].scale
 
-// The material's factor, whose formula and numbers are in manifest.json: material.
-float C(vec3 wi, vec3 wr);
-
 // The texture coordinate of u (or v) in [-2, 2]: texel i of N stands at t = 2 i / (N - 1) - 1.
 float coordinate(float u) {
     float t = sign(u) * pow(0.5 * abs(u), 1.0 / A);
     return (0.5 * (t + 1.0) * (N - 1.0) + 0.5) / N;
 }
 
-// X, Y, Z at (u, v, w) = -wi - wr, without the material's factor and cos(theta_i).
+// X, Y, Z at (u, v, w) = -wi - wr, without C cos(theta_i); 0 where nothing was computed.
 vec3 table_value(vec3 uvw) {
     vec2 at = vec2(coordinate(uvw.x), coordinate(uvw.y));
+    if (texture(I, vec3(at, 0)).a < 0.9999) return vec3(0.0);
     vec3 sum = vec3(0.0);
     for (int p = POWERS - 1; p >= 0; --p)       // Horner's rule
         sum = sum * uvw.z + scale[p] * texture(I, vec3(at, p)).rgb;
     return sum;
-}
-
-// XYZ under 1 RU for unit vectors towards the light and the viewer, z > 0 in both.
-vec3 diffraction(vec3 wi, vec3 wr) {
-    return C(wi, wr) * wi.z * table_value(-wi - wr);
 }

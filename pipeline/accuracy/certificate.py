@@ -52,31 +52,46 @@ class Certificate:
 
 
 def measure(
-    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> Certificate:
     """Measures a table against the exact reference of its height field, and the reference against plain sums.
 
-    evaluate: computes the table's XYZ for pairs of directions. reference: of the height field.
+    interpolate: computes the table's XYZ for pairs of directions, negative values included.
+    reference: of the height field.
     config: its light, material, scene and [accuracy] are read.
     progress: called with a step's name and its completed share, 0 to 1.
     Returns the certificate, with the budget that [accuracy] sets.
-    Raises AccuracyError where the two algorithms of the reference differ.
+    Raises AccuracyError where the two algorithms of the reference differ, or where setting negative values to 0
+    changes colours by more than the budget.
     """
     checked = check_reference(reference.fields[0], reference.first, config)
-    random = check_random(evaluate, reference, config, progress)
+    random = check_random(interpolate, reference, config, progress)
     exposure = config.accuracy.exposure_ru
+    refuse_clamping(random, config)
     return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, checked)
 
 
+def refuse_clamping(random: RandomCheck, config: Config) -> None:
+    """Raises AccuracyError where setting negative values to 0 changes colours by more than [accuracy] allows."""
+    budget, clamped = config.accuracy.delta_e, random.clamped
+    if budget is not None and clamped.cost.mean > budget:
+        raise AccuracyError(
+            f"the table's interpolation is negative in {100 * clamped.share:.3g} % of {random.directions} random "
+            f"directions; setting these values to 0 changes colours by a mean CIELAB difference of "
+            f"{clamped.cost.mean:.3g} at {clamped.cost.exposure_ru:g} RU, and accuracy.delta_e allows {budget:g}. "
+            "Use a finer table, or raise accuracy.delta_e"
+        )
+
+
 def certify(
-    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> Certificate:
     """Measures a table that was planned for an error budget, as `measure` does, and enforces the budget.
 
     Returns the certificate, with the budget of the plan.
     Raises AccuracyError where the table misses it, or where the two algorithms of the reference differ.
     """
-    found = replace(measure(evaluate, reference, config, progress), delta_e=config.budget_delta_e)
+    found = replace(measure(interpolate, reference, config, progress), delta_e=config.budget_delta_e)
     if found.measured > config.budget_delta_e:
         raise AccuracyError(
             f"the table misses its budget: on {found.random.directions} random directions its mean CIELAB error at "

@@ -16,7 +16,7 @@ from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.evaluate import Evaluator, Map
+from pipeline.tables.evaluate import Evaluator, Map, never_negative
 
 # the map over which this project states colour errors: 301 x 301 inside radius 0.98
 MAP_SIZE, MAP_RADIUS = 301, 0.98
@@ -52,34 +52,56 @@ def _colour_errors(config: Config, found: Array, truth: Array) -> list[ColourErr
 
 
 @dataclass(frozen=True)
+class Clamped:
+    """The negative values of interpolated colours, which are set to 0, on random directions.
+
+    share: of the directions, those with a negative channel. cost: CIELAB difference that the zeros make, over all
+    directions.
+    """
+
+    share: float
+    cost: ColourError
+
+
+def _clamped(config: Config, interpolated: Array) -> Clamped:
+    unit, exposure = config.radiometry.unit, config.accuracy.exposure_ru
+    moved = delta_e(never_negative(interpolated) / unit, interpolated / unit, exposure)
+    cost = ColourError(exposure, float(moved.mean()), float(np.percentile(moved, 99.0)), float(moved.max()))
+    return Clamped(float(np.mean(np.any(interpolated < 0.0, axis=-1))), cost)
+
+
+@dataclass(frozen=True)
 class RandomCheck:
     """Errors of a table against the reference on random directions.
 
     directions: their number. power: of Y over that of a mirror, which is |P|^2 integrated over wavelengths.
-    colour: CIELAB errors, one for each exposure.
+    colour: CIELAB errors, one for each exposure. clamped: the negative values that were set to 0.
     """
 
     directions: int
     power: RelativeError
     colour: list[ColourError]
+    clamped: Clamped
 
 
 def check_random(
-    evaluate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
 ) -> RandomCheck:
     """Compares a table with the reference on 2000 random directions that its planning did not use.
 
-    evaluate: computes the table's XYZ for pairs of directions. reference: of the same height field.
+    interpolate: computes the table's XYZ for pairs of directions, negative values included; the errors are those
+        without them. reference: of the same height field.
     config: its light, material, scene and exposure are read.
     progress: called with a step's name and its completed share, 0 to 1.
     """
     wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
     truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
-    found = evaluate(wi, wr)
+    interpolated = interpolate(wi, wr)
+    found = never_negative(interpolated)
     # Y over that of a mirror is |P|^2, without the material's factors
     mirror = config.radiometry.mirror_luminance(wi, wr)
     power = relative_error(found[:, 1] / mirror, truth[:, 1] / mirror, MIRROR_FLOOR)
-    return RandomCheck(len(wi), power, _colour_errors(config, found, truth))
+    return RandomCheck(len(wi), power, _colour_errors(config, found, truth), _clamped(config, interpolated))
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ def reference_evaluator(field: HeightField, config: Config, progress: Progress =
     """Makes a function that computes XYZ for pairs of directions by the exact reference.
 
     field: the height field. config: its window, light, material and layout are read.
-    Returns the function: unit vectors wi, wr (directions, 3) -> XYZ (directions, 3) at 1 RU.
+    Returns the function: unit vectors wi, wr (directions, 3) -> XYZ (directions, 3).
     """
     reference = reference_of(field, config, progress)
 

@@ -11,7 +11,6 @@ from pipeline.optics.light import LaserLine
 from pipeline.store.digest import of_file
 from pipeline.store.store import Artifact
 from pipeline.surface.periods import Period
-from pipeline.tables.taylor import grid
 
 _NOT_RECORDED = "not recorded"
 _LUMINOUS_NM = 550.0
@@ -26,7 +25,20 @@ CONVENTIONS = {
     "this sign a plane rising towards +x reflects towards -x",
     "window": "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch",
     "boundary": "the patch repeats periodically under the window",
-    "RU": "reflectance unit: at 1 RU a flat mirror (|P(0)|^2 = 1) in its own reflection saturates a screen",
+}
+_RU = "1 RU is the radiance of a flat sample of this material (|P(0)|^2 = 1) along its normal, in its reflection: "
+RU = {
+    "relative": f"{_RU}Y = 1, which saturates a screen at an exposure of 1 RU",
+    "absolute": f"{_RU}Y = colour.mirror_y, in 1/sr, which saturates a screen at an exposure of 1 RU",
+}
+XYZ_UNIT = {
+    "relative": "RU (normalisation relative, eq. 4 of Dhillon et al. 2014)",
+    "absolute": "1/sr (normalisation absolute), a BRDF times cos(theta_i)",
+}
+_WHITE = {
+    "relative": "a flat sample of this material along its normal, in its reflection, has Y = 1; X and Z are those of "
+    "the light that it reflects",
+    "absolute": "a flat sample of this material along its normal, in its own reflection, has Y = mirror_y, 1/sr",
 }
 
 
@@ -35,7 +47,7 @@ def units(config: Config, table: str) -> dict[str, str]:
     absolute = config.material.normalisation == "absolute"
     return {
         table: "1/sr" if absolute else "1",
-        "XYZ": "1/sr, because it is a BRDF times cos(theta_i)" if absolute else "RU",
+        "XYZ": XYZ_UNIT[config.material.normalisation],
         "u, v, w": "1",
         "lengths": "um",
         "wavelengths": "nm",
@@ -51,17 +63,23 @@ def colour(config: Config, inputs: Mapping[str, Artifact]) -> Colour:
         range_nm=list(config.light.range_nm),
         step_nm=config.table.integral_step_nm,
         wavelengths=inputs["table"].summary["wavelengths"],
+        normalisation=config.material.normalisation,
+        white=_WHITE[config.material.normalisation],
+        mirror_y=config.radiometry.unit,
     )
 
 
-def coverage(config: Config, inputs: Mapping[str, Artifact]) -> Coverage:
-    """Returns the entry on directions that the scan's Nyquist limits and the scene exclude."""
+def coverage(config: Config, inputs: Mapping[str, Artifact], rho_max: float) -> Coverage:
+    """Returns the entry on directions that the scan's Nyquist limits and the scene exclude.
+
+    rho_max: sqrt(u^2 + v^2) up to which the table was computed.
+    """
     table, band = inputs["table"].summary, inputs["surface"].summary["statistics"]["band_limit_per_um"]
     known = 1e-3 * config.light.lambda_min_nm * min(band)
     return Coverage(
         unknown_share=table["unknown_share"],
         skipped_share=table["skipped_share"],
-        known_radius=min(grid.U_MAX, known),
+        known_radius=min(rho_max, known),
         band_limit_per_um=list(band),
     )
 

@@ -2,8 +2,9 @@
 
     python evaluate.py directions.csv
 
-reads rows of theta_i,phi_i,theta_r,phi_r (light, view; degrees), prints X,Y,Z under 1 RU: linear, not sRGB.
-Directions point away from the surface, z is its normal. A row is nan where the table was not computed.
+reads rows of theta_i,phi_i,theta_r,phi_r (light, view; degrees), prints X,Y,Z: linear, not sRGB.
+X,Y,Z are in the unit that manifest.json states.
+Directions point away from the surface, z is its normal. Values below the horizon, not computed or negative are 0.
 """
 
 import json
@@ -20,7 +21,7 @@ COLUMNS, AT_ONCE = "theta_i,phi_i,theta_r,phi_r", 16384  # directions at once, t
 
 
 class BundleTables:
-    """A bundle in memory: XYZ = C cos(ti) times the value of its table at (u, v, w) = -wi - wr."""
+    """A bundle in memory: XYZ = max(0, C cos(ti) times the value of its table at (u, v, w) = -wi - wr)."""
 
     def __init__(self, folder: Path) -> None:
         self.manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -30,23 +31,24 @@ class BundleTables:
         self.table = layout(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3); nan where not computed."""
-        if np.any(wi[:, 2] <= 0.0) or np.any(wr[:, 2] <= 0.0):
-            raise ValueError("expected directions above the horizon, z > 0, got one on or below it")
-        parts = [slice(first, first + AT_ONCE) for first in range(0, len(wi), AT_ONCE)]
-        found = [self.c_cos(wi[s], wr[s])[:, None] * self.table.value(*(-wi[s] - wr[s]).T) for s in parts]
-        return np.concatenate([np.empty((0, 3)), *found])
+        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3)."""
+        return np.asarray(np.fmax(self.signed(wi, wr), 0.0))
+
+    def signed(self, wi: Array, wr: Array) -> Array:
+        """Computes XYZ (directions, 3) with the negative values of overshoots, and nan where not computed."""
+        found, above = np.zeros((len(wi), 3)), np.flatnonzero(np.minimum(wi[:, 2], wr[:, 2]) > 0.0)
+        for at in np.array_split(above, range(AT_ONCE, len(above), AT_ONCE)):
+            found[at] = self.c_cos(wi[at], wr[at])[:, None] * self.table.value(*(-wi[at] - wr[at]).T)
+        return found
 
     def c_cos(self, wi: Array, wr: Array) -> Array:
         """Computes C cos(ti) = (R / divisor)^exponent (1 + wi.wr)^2 / (cos(tr) w^2), times V-cavity shadowing."""
-        material = self.manifest["material"]
-        dot, w = np.sum(wi * wr, axis=-1), -wi[:, 2] - wr[:, 2]
-        cos_half = np.sqrt(np.clip(0.5 * (1.0 + dot), 0.0, 1.0))
-        reflected = (self.reflectance(cos_half) / material["divisor"]) ** material["exponent"]
-        factor = reflected * (1.0 + dot) ** 2 / (wr[:, 2] * w**2)
+        material, s = self.manifest["material"], wi + wr
+        one_plus_dot = 0.5 * np.sum(s * s, axis=-1)  # 1 + wi.wr cancels at grazing angles
+        reflected = self.reflectance(np.sqrt(0.5 * one_plus_dot)) / material["divisor"]
+        factor = reflected ** material["exponent"] * (one_plus_dot / s[:, 2]) ** 2 / wr[:, 2]
         if material["shadowing"]:
-            facet = (wi[:, 2] + wr[:, 2]) / cos_half**2
-            factor = factor * np.minimum(1.0, facet * np.minimum(wi[:, 2], wr[:, 2]))
+            factor *= np.minimum(1.0, 2.0 * s[:, 2] * np.minimum(wi[:, 2], wr[:, 2]) / one_plus_dot)
         return np.asarray(factor)
 
     def reflectance(self, cos: Array) -> Array:
@@ -74,12 +76,12 @@ class PolarTextures:
     def value(self, u: Array, v: Array, w: Array) -> Array:
         """Computes g(rho) sum_k T_k(2 |w| / w_max - 1) sum_o output_o(u, v) basis[o, channel, k], (directions, 3)."""
         rho = np.hypot(u, v)
-        x = np.clip(2.0 * np.abs(w) / np.sqrt(np.maximum(4.0 - rho**2, 1e-9)) - 1.0, -1.0, 1.0)
+        x = np.clip(2.0 * np.abs(w) / np.sqrt(np.maximum(4.0 - rho**2, 1e-6)) - 1.0, -1.0, 1.0)
         chebyshev = np.cos(np.arange(self.basis.shape[2]) * np.arccos(x)[:, None])
         g = (1.0 + (rho / self.grid["envelope_radius"]) ** 2) ** -self.grid["envelope_exponent"]
-        ring, last = np.arcsinh(rho / self.grid["r0"]) / self.grid["step"], self.grid["height"] - 1
-        g[ring > last + 1e-6] = np.nan  # outside the scene
-        outputs = self.interpolate(np.minimum(ring, last), self.azimuth(u, v))
+        g[rho > self.grid["rho_max"] * (1.0 + 1e-6)] = np.nan  # outside the scene
+        ring = np.minimum(np.arcsinh(rho / self.grid["r0"]) / self.grid["step"], self.grid["height"] - 1)
+        outputs = self.interpolate(ring, self.azimuth(u, v))
         return np.asarray(g[:, None] * np.einsum("no,ock,nk->nc", outputs, self.basis, chebyshev, optimize=True))
 
     def azimuth(self, u: Array, v: Array) -> Array:
@@ -90,8 +92,8 @@ class PolarTextures:
 
     def interpolate(self, ring: Array, azimuth: Array) -> Array:
         """Interpolates outputs (directions, outputs) from the 4 x 4 texels around each place."""
-        total = np.zeros((len(ring), len(self.basis)))
         rows, columns = np.floor(ring).astype(int) - 1, np.floor(azimuth).astype(int) - 1
+        total = np.zeros((len(ring), len(self.basis)))
         for a, across in enumerate(spline(ring % 1.0)):
             for b, along in enumerate(spline(azimuth % 1.0)):
                 total += (across * along)[:, None] * self.texels[self.place(rows + a, columns + b)]
@@ -99,9 +101,8 @@ class PolarTextures:
 
     def place(self, row: NDArray[Any], column: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Maps rows and columns beyond the grid to texels: through the origin, mirrored at the rim, periodic."""
-        height, width = self.grid["height"], self.grid["width"]
-        column = (column + np.where(row < 0, width // 2, 0)) % width
-        return height - 1 - np.abs(height - 1 - np.abs(row)), column
+        last, width = self.grid["height"] - 1, self.grid["width"]
+        return last - np.abs(last - np.abs(row)), (column + np.where(row < 0, width // 2, 0)) % width
 
 
 def spline(t: Array) -> Array:
@@ -122,10 +123,8 @@ class TaylorTextures:
         """Computes sum_p w^p I_p(u, v), (directions, 3)."""
         column, row = self.texel(u), self.texel(v)
         left, low = (np.clip(np.floor(index).astype(int), 0, self.n - 2) for index in (column, row))
-        a, b = column - left, row - low
-        total = np.zeros((len(w), 3))
-        corners = ((0, 0, (1 - a) * (1 - b)), (0, 1, a * (1 - b)), (1, 0, (1 - a) * b), (1, 1, a * b))
-        for up, right, weight in corners:
+        a, b, total = column - left, row - low, np.zeros((len(w), 3))
+        for up, right, weight in ((0, 0, (1 - a) * (1 - b)), (0, 1, a * (1 - b)), (1, 0, (1 - a) * b), (1, 1, a * b)):
             at = low + up, left + right
             known = self.computed[at] | (weight == 0.0)
             total += np.where(known, weight, np.nan)[:, None] * self.polynomial(self.i_p[at], w)
@@ -133,8 +132,7 @@ class TaylorTextures:
 
     def texel(self, u: Array) -> Array:
         """Computes the texel index i of u = 2 |t|^a sign(t), t = 2 i / (n - 1) - 1; texture: (i + 1/2) / n."""
-        t = np.sign(u) * (np.abs(u) / 2.0) ** (1.0 / self.power)
-        return np.asarray(0.5 * (t + 1.0) * (self.n - 1))
+        return np.asarray(0.5 * (np.sign(u) * (np.abs(u) / 2.0) ** (1.0 / self.power) + 1.0) * (self.n - 1))
 
     def polynomial(self, i_p: NDArray[Any], w: Array) -> Array:
         """Computes sum_p w^p I_p by Horner's rule, from the highest p down."""
@@ -152,8 +150,8 @@ def read_rgba(path: Path) -> NDArray[Any]:
 
 def direction(theta_deg: Array, phi_deg: Array) -> Array:
     """Computes unit vectors (directions, 3) from the angle to z and the azimuth from +x towards +y, degrees."""
-    theta, phi = np.radians(theta_deg), np.radians(phi_deg)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    sin, cos, phi = np.sin(np.radians(theta_deg)), np.sin(np.radians(90.0 - theta_deg)), np.radians(phi_deg)
+    return np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], axis=-1)  # at 90 degrees, this cosine is 0
 
 
 def read_directions(text: str) -> Array:
@@ -166,8 +164,8 @@ def read_directions(text: str) -> Array:
                 theta_i, phi_i, theta_r, phi_r = map(float, content.split(","))
             except ValueError:
                 raise ValueError(f"line {number}: expected four numbers {COLUMNS}, got {content!r}") from None
-            if not (0 <= theta_i < 90 and 0 <= theta_r < 90 and abs(phi_i) < 1e6 and abs(phi_r) < 1e6):
-                raise ValueError(f"line {number}: expected theta in [0, 90) and finite phi, degrees, got {content!r}")
+            if not (0 <= theta_i <= 180 and 0 <= theta_r <= 180 and abs(phi_i) < 1e6 and abs(phi_r) < 1e6):
+                raise ValueError(f"line {number}: expected theta in [0, 180], finite phi, degrees, got {content!r}")
             rows.append([theta_i, phi_i, theta_r, phi_r])
     if not rows:
         raise ValueError(f"expected rows of {COLUMNS} in degrees, got none")
@@ -179,7 +177,9 @@ if __name__ == "__main__":
         sys.exit("usage: python evaluate.py directions.csv")
     try:
         angles = read_directions(Path(sys.argv[1]).read_text(encoding="utf-8-sig"))
-        found = BundleTables(Path(__file__).parent).xyz(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
+        found = BundleTables(Path(__file__).parent).signed(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
     except (OSError, ValueError) as error:
         sys.exit(f"{sys.argv[1]}: {error}")
-    print("X,Y,Z", *(",".join(f"{value:.12g}" for value in values) for values in found), sep="\n")
+    print("X,Y,Z", *(",".join(f"{value:.12g}" for value in row) for row in np.fmax(found, 0.0)), sep="\n")
+    for count, why in ((np.isnan(found).any(1).sum(), "not computed"), ((found < 0.0).any(1).sum(), "negative")):
+        print(f"{count} of {len(found)} rows were {why}, now 0\n" if count else "", end="", file=sys.stderr)

@@ -53,12 +53,18 @@ TableImage = Annotated[TaylorImage | PolarImage, Field(discriminator="layout")]
 
 
 class MapImage(Image):
-    """The BRDF map of one light: XYZ at 1 RU, and a picture at an exposure."""
+    """The BRDF map of one light: XYZ, and an sRGB picture at an exposure, RU.
+
+    negative_share: of the views, those with a negative channel, which was set to 0.
+    clipped_share: of the views, those whose colour at the exposure is outside the gamut of sRGB or above its white.
+    """
 
     theta_deg: float
     phi_deg: float
     png: str
     exposure_ru: float
+    negative_share: float
+    clipped_share: float
 
 
 # --- grids ---------------------------------------------------------------------------------------------
@@ -125,7 +131,7 @@ class PolarGridEntry(Validated):
     )
     w_basis: str = (
         "value[channel] = sum_k c[channel][k] T_k(x), Chebyshev's polynomials of x = 2 |w| / w_max - 1, "
-        "w_max = sqrt(4 - rho^2)"
+        "w_max = sqrt(max(4 - rho^2, 1e-6)), x clamped to [-1, 1]"
     )
 
 
@@ -156,8 +162,9 @@ class PolarLoss(Validated):
 
     textures: number of RGBA textures; `most_textures` would hold the whole table. error: of the stored textures
     against the exact sum. added: against the table as baked. added_in_mirror: the same in the mirror directions of
-    the lights, at 1 RU. subnormal_share: of all values, those that half floats store with fewer than 11 bits; None
-    for float.
+    the lights, at 1 RU. y_in_mirror: relative errors of Y there. mirror_kept: whether `added_in_mirror` is on average
+    below the just noticeable difference, 2.3. subnormal_share: of all values, those that half floats store with fewer
+    than 11 bits; None for float.
     """
 
     layout: Literal["polar"]
@@ -167,6 +174,8 @@ class PolarLoss(Validated):
     error: ColourError
     added: ColourError
     added_in_mirror: ColourError
+    y_in_mirror: RelativeError
+    mirror_kept: bool
     subnormal_share: float | None
 
 
@@ -179,6 +188,7 @@ class Colour(Validated):
     """The colour space of all numbers.
 
     wavelengths: number in the spectral integral, the largest of all rings. step_nm: None where each ring has its own.
+    mirror_y: Y of 1 RU, of a flat sample of the material along its normal, in its own reflection.
     """
 
     space: str = "CIE XYZ, linear (not sRGB)"
@@ -187,7 +197,10 @@ class Colour(Validated):
     range_nm: list[float]
     step_nm: float | None
     wavelengths: int
-    white: str = "a perfect mirror in its own reflection has Y = 1 at 1 RU ('relative'); X and Z are the illuminant's"
+    normalisation: Literal["relative", "absolute"]
+    white: str
+    mirror_y: Normal
+    exposure: str = "a picture at an exposure of E RU shows XYZ E / mirror_y in sRGB, clipped to its gamut"
 
 
 class Coverage(Validated):
@@ -195,7 +208,8 @@ class Coverage(Validated):
 
     unknown_share: share of the light in the (u, v) disc beyond the scan's Nyquist limits, which counts as dark.
     skipped_share: share of the disc that is not computed, because no light and view of the scene reach it.
-    known_radius: sqrt(u^2 + v^2) up to which every wavelength lies within the Nyquist limits, at most 2.
+    known_radius: sqrt(u^2 + v^2) up to which the table was computed and every wavelength lies within the Nyquist
+    limits.
     band_limit_per_um: the Nyquist limits along x and y, 1/um.
     """
 

@@ -18,8 +18,8 @@ _NODES = 257
 _BETWEEN = 16
 
 FORMULA = (
-    "C = (R(cos_half) / divisor)^exponent * (1 + wi.wr)^2 / (cos(theta_i) cos(theta_r) w^2) * D, "
-    "cos_half = sqrt((1 + wi.wr) / 2)"
+    "C = (R(cos_half) / divisor)^exponent * G / w^2 * D, G = (0.5 |wi + wr|^2)^2 / (cos(theta_i) cos(theta_r)), "
+    "cos_half = 0.5 |wi + wr|; 0.5 |wi + wr|^2 is 1 + wi.wr, which cancels where both directions graze"
 )
 SHADOWING = "D = min(1, (wi.z + wr.z) min(wi.z, wr.z) / cos_half^2): symmetric V grooves, Cook & Torrance 1982"
 NO_SHADOWING = "D = 1"

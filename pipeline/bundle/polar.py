@@ -1,29 +1,28 @@
 """Polar tables in a bundle: images of spline coefficients with four outputs each."""
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
-from pipeline.bundle import polar_storage
-from pipeline.bundle.manifest import PolarGridEntry, PolarImage
+from pipeline.bundle.manifest import PolarGridEntry, PolarImage, PolarLoss
 from pipeline.bundle.polar_storage import Stored
 from pipeline.bundle.prepared import Prepared, Texture
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference
 from pipeline.report import images
 from pipeline.tables.polar.compression import CHANNELS, Textures
-from pipeline.tables.polar.table import PolarTable
 
 _CONVENTION = (
     "value(u, v, |w|) = sum_lambda |P|^2 S(lambda) xyzbar(lambda) / sum_lambda S ybar, with the factors of the "
     "material that vary with wavelength inside the sum; 'grid' says how it is stored"
 )
 _EVALUATION = (
-    "XYZ = C cos(theta_i) value(u, v, |w|); value = g(rho) sum_k T_k(x) sum_o output_o(u, v) basis[o][channel][k], "
-    "output_o looked up by cubic B-splines; see 'grid'"
+    "XYZ = max(0, C cos(theta_i) value(u, v, |w|)); value = g(rho) sum_k T_k(x) sum_o output_o(u, v) "
+    "basis[o][channel][k], output_o looked up by cubic B-splines; see 'grid'. XYZ = 0 where wi.z <= 0 or wr.z <= 0, "
+    "and where rho > rho_max (1 + 1e-6), which was not computed"
 )
 _WINDOW = (
     "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch; where plan.windows > 1, |P|^2 is its mean over "
@@ -33,20 +32,16 @@ _WINDOW = (
 
 def prepare(
     config: Config,
-    table: PolarTable,
-    reference: Callable[[], MeanReference],
+    stored: Stored,
+    summary: dict[str, Any],
     plan: dict[str, Any],
-    certificate: dict[str, Any],
 ) -> Prepared:
     """Prepares a polar table for a bundle.
 
-    config: its [publish], [accuracy], light, material and scene are read. table: the table.
-    reference: makes the exact reference of the surface; called only where storage loses digits.
-    plan, certificate: of the table, for the manifest.
+    config: its [publish] is read. stored: the textures. summary: of the stage "textures". plan: for the manifest.
     Returns the layout's part of the bundle.
-    Raises AccuracyError where the stored table misses a budget.
     """
-    stored, loss = polar_storage.choose(config, table, reference)
+    loss = None if summary["loss"] is None else PolarLoss.model_validate_json(json.dumps(summary["loss"]))
     entry = grid_entry(stored.textures)
     return Prepared(
         holds="value",
@@ -56,14 +51,16 @@ def prepare(
         images=_images(config, stored),
         count=stored.textures.count,
         plan=plan,
-        certificate=TypeAdapter(Certificate).validate_python(certificate),
+        certificate=TypeAdapter(Certificate).validate_python(summary["certificate"]),
         loss=loss,
+        rho_max=entry.rho_max,
         constants={
             "RINGS": entry.height,
             "AZIMUTHS": entry.width,
             "TEXTURES": stored.textures.count,
             "TERMS": entry.w_terms,
             "LOW_RANK": entry.basis is not None,
+            "RHO_MAX": entry.rho_max,
             "R0": entry.r0,
             "STEP": entry.step,
             "AXIS": entry.axis_rad,

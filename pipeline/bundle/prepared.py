@@ -22,6 +22,7 @@ class Prepared:
     evaluation: the formula of the look-up, for the manifest. grid: positions and meaning of the texels.
     images: the tables, `count` in number, made one by one as they are needed.
     plan, certificate: of the table. loss: the error that storage adds; None where nothing is lost.
+    rho_max: sqrt(u^2 + v^2) up to which the table was computed.
     constants: values of the constants of the layout's shader in kernels/shaders/.
     """
 
@@ -34,4 +35,5 @@ class Prepared:
     plan: dict[str, Any]
     certificate: Certificate
     loss: StorageLoss | None
+    rho_max: float
     constants: dict[str, bool | int | float]

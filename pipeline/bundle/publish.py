@@ -20,6 +20,8 @@ from pipeline.store.store import Artifact, writing
 EVALUATOR, README = "evaluate.py", "README.md"
 TABLES, MAPS, REPORT = "tables", "maps", "report.html"
 _TEMPORARY = ".publishing-"
+# the line of the evaluator that a bundle's own replaces
+_UNIT = "X,Y,Z are in the unit that manifest.json states."
 # as pipeline.report.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
 
@@ -113,7 +115,7 @@ def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], fold
         version=config.publish.version,
         licence=config.publish.licence or "not stated",
         made_by=entries.made_by(inputs),
-        conventions={**entries.CONVENTIONS, **table.conventions},
+        conventions={**entries.CONVENTIONS, "RU": entries.RU[config.material.normalisation], **table.conventions},
         units=entries.units(config, table.holds),
         evaluation=table.evaluation,
         grid=table.grid,
@@ -123,7 +125,7 @@ def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], fold
         tables=tables,
         maps=maps,
         report=REPORT,
-        coverage=entries.coverage(config, inputs),
+        coverage=entries.coverage(config, inputs, table.rho_max),
         domain=entries.domain(config, inputs),
         plan=table.plan,
         certificate=table.certificate,
@@ -135,7 +137,8 @@ def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], fold
     _write_text(folder / MANIFEST, page.text())
     _write_text(folder / README, readme.text(page, table.constants))
     source = files("pipeline.bundle").joinpath("evaluator.py").read_text(encoding="utf-8")
-    _write_text(folder / EVALUATOR, source)
+    unit = entries.XYZ_UNIT[config.material.normalisation]
+    _write_text(folder / EVALUATOR, source.replace(_UNIT, f"X,Y,Z are in {unit}."))
 
 
 def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[TableImage]:
@@ -167,6 +170,8 @@ def _copy_maps(render: Artifact, folder: Path) -> list[MapImage]:
                 phi_deg=found["phi_deg"],
                 png=f"{MAPS}/{found['png']}",
                 exposure_ru=render.summary["exposure_ru"],
+                negative_share=found["negative_share"],
+                clipped_share=found["clipped_share"],
             )
         )
     return copied

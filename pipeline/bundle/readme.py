@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 
 from pipeline.bundle.manifest import Manifest
+from pipeline.bundle.material import MaterialEntry
 from pipeline.report import template
 
 Constant = bool | int | float
@@ -26,6 +27,7 @@ def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
         f"{layout}.md.in",
         manifest=manifest,
         grid=manifest.grid,
+        rho_max=getattr(manifest.grid, "rho_max", 2.0),
         tables=len(manifest.tables),
         material=manifest.material,
         reflectance=manifest.material.reflectance_table,
@@ -33,21 +35,26 @@ def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
         certified=next(error for error in certificate.random.colour if error.exposure_ru == certificate.exposure_ru),
         loss=manifest.storage_loss,
         domain=manifest.domain,
-        shader=shader(layout, constants).rstrip(),
+        shader="\n".join((shader(layout, constants), shader("brdf", _brdf(manifest.material)))).rstrip(),
     )
 
 
-def shader(layout: str, constants: Mapping[str, Constant]) -> str:
-    """Reads the look-up of a layout in GLSL, with the constants of a table in place of the file's.
+def _brdf(material: MaterialEntry) -> dict[str, Constant]:
+    """Returns the constants of brdf.glsl."""
+    return {"DIVISOR": material.divisor, "EXPONENT": material.exponent, "SHADOWING": material.shadowing}
 
-    layout: name of the layout. constants: a value for every global constant of the file, by name.
+
+def shader(name: str, constants: Mapping[str, Constant]) -> str:
+    """Reads a file of kernels/shaders/ with the constants of a table in place of the file's.
+
+    name: of the file without its suffix. constants: a value for every global constant of the file, by name.
     Returns GLSL.
     Raises ValueError where the names are not those of the file.
     """
-    source = files("kernels").joinpath("shaders", f"{layout}.glsl").read_text(encoding="utf-8")
+    source = files("kernels").joinpath("shaders", f"{name}.glsl").read_text(encoding="utf-8")
     declared = {name for _, name in _CONSTANT.findall(source)}
     if declared != constants.keys():
-        raise ValueError(f"{layout}.glsl declares {sorted(declared)}, but got values for {sorted(constants)}")
+        raise ValueError(f"{name}.glsl declares {sorted(declared)}, but got values for {sorted(constants)}")
     return _CONSTANT.sub(lambda found: f"{found[1]}{_literal(constants[found[2]])};", source)
 
 

@@ -1,5 +1,6 @@
 """The paper's tables in a bundle: an image for each I_p."""
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -20,22 +21,20 @@ _CONVENTION = (
     "factors of the material that vary with wavelength inside the sum"
 )
 _EVALUATION = (
-    "XYZ = C cos(theta_i) sum_p w^p I_p(u, v); I_p = scale_p * (R, G, B) where A = 1; "
-    "by Horner's rule from the highest p down"
+    "XYZ = max(0, C cos(theta_i) sum_p w^p I_p(u, v)); I_p = scale_p * (R, G, B) where A = 1; by Horner's rule from "
+    "the highest p down. XYZ = 0 where wi.z <= 0 or wr.z <= 0, and where the interpolated A < 0.9999, which was not "
+    "computed"
 )
 
 
-def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificate: dict[str, Any]) -> Prepared:
+def prepare(config: Config, table: TaylorTable, summary: dict[str, Any], plan: dict[str, Any]) -> Prepared:
     """Prepares a Taylor table for a bundle.
 
-    config: its [publish], light, material and scene are read. table: the table.
-    plan, certificate: of the table, for the manifest.
+    config: its [publish] is read. table: as baked. summary: of the stage "textures". plan: for the manifest.
     Returns the layout's part of the bundle.
-    Raises AccuracyError where half floats would lose digits.
     """
     scale = taylor_storage.scales(table, config.publish.precision)
-    # measured before anything is written, because this may raise AccuracyError
-    loss = taylor_storage.measure(config, table, scale) if config.publish.precision == "half" else None
+    loss = None if summary["loss"] is None else TaylorLoss.model_validate_json(json.dumps(summary["loss"]))
     entry = TaylorGridEntry(
         layout="taylor", width=table.resolution, height=table.resolution, power=table.power, u_max=grid.U_MAX
     )
@@ -47,8 +46,9 @@ def prepare(config: Config, table: TaylorTable, plan: dict[str, Any], certificat
         images=_images(config, table, scale, loss),
         count=len(scale),
         plan=plan,
-        certificate=TypeAdapter(Certificate).validate_python(certificate),
+        certificate=TypeAdapter(Certificate).validate_python(summary["certificate"]),
         loss=loss,
+        rho_max=grid.U_MAX,
         constants={"POWERS": len(scale), "N": float(entry.width), "A": entry.power},
     )
 

@@ -72,7 +72,7 @@ def in_band(field: HeightField, uvw: Array, lambda_um: Array) -> NDArray[np.bool
 
 
 def xyz_direct(field: HeightField, sigma_um: float, light: Light, material: Material, wi: Array, wr: Array) -> Array:
-    """Computes XYZ at an exposure of 1 RU by `power_direct`, in steps of 1 nm.
+    """Computes XYZ by `power_direct`, in steps of 1 nm.
 
     wi, wr: unit vectors (directions, 3). The other parameters are those of `power_direct` and `integrate`.
     Returns (directions, 3).
@@ -155,7 +155,7 @@ class Reference:
         step_nm: float = STEP_NM,
         progress: Progress = silent,
     ) -> Array:
-        """Computes XYZ (directions, 3) at an exposure of 1 RU for unit vectors wi, wr (directions, 3).
+        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3).
 
         step_nm: step of the spectral integral, nm.
         """
@@ -194,7 +194,7 @@ class MeanReference:
         return self.first.stored_bytes + sum(field.nbytes for field in self.fields)
 
     def xyz(self, light: Light, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
-        """Computes XYZ (directions, 3) at an exposure of 1 RU for unit vectors wi, wr (directions, 3)."""
+        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3)."""
         return self._mean(lambda each: each.xyz(light, material, wi, wr, progress=progress))
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:

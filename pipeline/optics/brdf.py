@@ -15,6 +15,8 @@ from pipeline.optics import fresnel, geometry
 from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 
+_NORMAL = np.array([0.0, 0.0, 1.0])
+
 
 @dataclass(frozen=True)
 class Radiometry:
@@ -65,8 +67,11 @@ class Radiometry:
 
     @property
     def unit(self) -> float:
-        """Y of 1 RU, the unit of exposures."""
-        return relative_unit(self.material, self._mean_light, self.sigma_um)
+        """Y of 1 RU, the unit of exposures: of a flat sample of the material that mirrors light along its normal.
+
+        It is 1 for `relative`, and the peak of the flat sample's BRDF, 1/sr, for `absolute`.
+        """
+        return float(self.mirror_luminance(_NORMAL, _NORMAL))
 
     @property
     def _mean_light(self) -> Quadrature:
@@ -98,11 +103,16 @@ def geometry_factor(material: Material, wi: Array, wr: Array) -> Array:
     """Computes the part of C cos(ti) without the reflectance: G cos(ti) / w^2, times the V-cavity term.
 
     material: only its `shadowing` is read. wi, wr: unit vectors (..., 3).
-    Returns (...,).
+    Returns (...,); 0 where light or view are at or below the horizon.
     """
+    above = geometry.above_horizon(wi, wr)
+    # straight up stands in for the pairs that reflect nothing
+    wi, wr = (np.where(above[..., None], one, [0.0, 0.0, 1.0]) for one in (wi, wr))
     w = geometry.uvw(wi, wr)[..., 2]
     factor = geometry.obliquity(wi, wr) * wi[..., 2] / w**2
-    return factor * geometry.v_cavity(wi, wr) if material.shadowing else factor
+    if material.shadowing:
+        factor = factor * geometry.v_cavity(wi, wr)
+    return np.asarray(np.where(above, factor, 0.0))
 
 
 def grey(lambda_nm: Array, cos_half: Array) -> Array:
@@ -123,14 +133,6 @@ def window_area(material: Material, quadrature: Quadrature, sigma_um: float) -> 
     if material.normalisation == "relative":
         return np.ones_like(quadrature.lambda_nm)
     return 4.0 * pi * (sigma_um / (1e-3 * quadrature.lambda_nm)) ** 2
-
-
-def relative_unit(material: Material, quadrature: Quadrature, sigma_um: float) -> float:
-    """Computes Y of 1 RU: 1 for `relative`, the peak BRDF of a perfect mirror, 1/sr, for `absolute`.
-
-    quadrature: of the light. sigma_um: standard deviation of the coherence window, um.
-    """
-    return float(window_area(material, quadrature, sigma_um) @ quadrature.weights[:, 1])
 
 
 def metal_reflectance(material: Material, quadrature: Quadrature, cos_half: Array) -> Array:

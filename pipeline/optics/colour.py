@@ -8,7 +8,6 @@ from pipeline.arrays import Array
 
 # the exposures of [D14] table 2, in RU (1 RU saturates a mirror seen in its own reflection)
 EXPOSURES_RU = (1.0, 1000.0, 7500.0)
-DISPLAY_GAMMA = 2.2  # [D14] sec. 7
 
 # linear sRGB, rounded as IEC 61966-2-1 prints it, and XYZ of its white, D65
 SRGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
@@ -20,10 +19,20 @@ WHITE_XYZ = np.array([_WHITE_X / _WHITE_Y, 1.0, (1.0 - _WHITE_X - _WHITE_Y) / _W
 def displayed_srgb(xyz: Array, exposure_ru: float) -> Array:
     """Converts XYZ at an exposure to what a display can show.
 
-    xyz: (..., 3), linear, at 1 RU. exposure_ru: factor on it, RU.
+    xyz: (..., 3), linear, in RU. exposure_ru: factor on it, RU.
     Returns linear sRGB (..., 3), clipped to [0, 1].
     """
     return np.asarray(np.clip(_by_matrix(SRGB_FROM_XYZ, exposure_ru * xyz), 0.0, 1.0))
+
+
+def clipped(xyz: Array, exposure_ru: float) -> np.ndarray:
+    """Marks the colours (...,) that a display cannot show: outside the gamut of sRGB, or brighter than its white.
+
+    xyz: (..., 3), linear, in RU. exposure_ru: factor on it, RU.
+    """
+    linear = _by_matrix(SRGB_FROM_XYZ, exposure_ru * xyz)
+    # the matrix is rounded, which leaves white some 1e-4 beside 1
+    return np.asarray(np.any((linear < -1e-3) | (linear > 1.0 + 1e-3), axis=-1))
 
 
 def _by_matrix(matrix: Array, values: Array) -> Array:
@@ -33,19 +42,20 @@ def _by_matrix(matrix: Array, values: Array) -> Array:
 
 
 def pixels(xyz: Array, exposure_ru: float) -> np.ndarray:
-    """Converts XYZ at an exposure to 8-bit pixels with a display gamma of 2.2.
+    """Converts XYZ at an exposure to 8-bit sRGB, by the curve of IEC 61966-2-1.
 
-    xyz: (..., 3), linear, at 1 RU. exposure_ru: factor on it, RU.
+    xyz: (..., 3), linear, in RU. exposure_ru: factor on it, RU.
     Returns uint8 (..., 3).
     """
-    shown = displayed_srgb(xyz, exposure_ru) ** (1.0 / DISPLAY_GAMMA)
+    linear = displayed_srgb(xyz, exposure_ru)
+    shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
     return np.round(255.0 * shown).astype(np.uint8)
 
 
 def delta_e(xyz: Array, reference: Array, exposure_ru: float) -> Array:
     """Computes the CIELAB difference of 1976 between two colours as a display shows them.
 
-    xyz, reference: (..., 3), linear, at 1 RU. exposure_ru: factor on both, RU.
+    xyz, reference: (..., 3), linear, in RU. exposure_ru: factor on both, RU.
     Returns dE*ab (...,) under D65, without chromatic adaptation.
     """
     shown = (displayed_srgb(values, exposure_ru) for values in (xyz, reference))
@@ -74,7 +84,7 @@ class ColourError:
 def colour_errors(xyz: Array, reference: Array, asked_ru: float) -> list[ColourError]:
     """Measures the CIELAB difference at each exposure of [D14] table 2 and at `asked_ru`.
 
-    xyz, reference: (..., 3), linear, at 1 RU. asked_ru: one more exposure, RU.
+    xyz, reference: (..., 3), linear, in RU. asked_ru: one more exposure, RU.
     Returns one entry per exposure, ascending.
     """
     errors = []

@@ -21,15 +21,24 @@ def uvw(wi: Array, wr: Array) -> Array:
     return -wi - wr
 
 
+def above_horizon(wi: Array, wr: Array) -> np.ndarray:
+    """Marks the pairs (...,) whose light and view are both above the surface; all others reflect nothing."""
+    return np.asarray(np.minimum(wi[..., 2], wr[..., 2]) > 0.0)
+
+
+def one_plus_dot(wi: Array, wr: Array) -> Array:
+    """Computes 1 + wi.wr (...,) as |wi + wr|^2 / 2, which keeps its digits where both directions graze."""
+    return np.asarray(0.5 * np.sum((wi + wr) ** 2, axis=-1))
+
+
 def cos_half(wi: Array, wr: Array) -> Array:
     """Computes the cosine (...,) of the angle between either direction and their half vector."""
-    return np.asarray(np.sqrt(np.clip(0.5 * (1.0 + np.sum(wi * wr, axis=-1)), 0.0, 1.0)))
+    return np.asarray(np.sqrt(np.minimum(0.5 * one_plus_dot(wi, wr), 1.0)))
 
 
 def obliquity(wi: Array, wr: Array) -> Array:
     """Computes G = (1 + wi.wr)^2 / (cos ti cos tr), (...,) ([D14], below eq. 2)."""
-    dot = np.sum(wi * wr, axis=-1)
-    return np.asarray((1.0 + dot) ** 2 / (wi[..., 2] * wr[..., 2]))
+    return np.asarray(one_plus_dot(wi, wr) ** 2 / (wi[..., 2] * wr[..., 2]))
 
 
 def v_cavity(wi: Array, wr: Array) -> Array:

@@ -12,14 +12,14 @@ class Material(Validated):
 
     fresnel: the reflectance model; "none" is a perfect mirror. ior: refractive index, of "schlick" and "dielectric".
     metal: "Au", or a CSV of lambda_nm,n,k, of "conductor". shadowing: whether the V-cavity term applies.
-    normalisation: "relative" ([D14] eq. 4), or "absolute": a BRDF in 1/sr.
+    normalisation: "absolute": a BRDF in 1/sr; or "relative" ([D14] eq. 4), to compare with the paper.
     """
 
     fresnel: Literal["none", "schlick", "dielectric", "conductor"] = "schlick"
     ior: Annotated[float, Field(gt=1, le=5)] = 1.5
     metal: str = "Au"
     shadowing: bool = True
-    normalisation: Literal["relative", "absolute"] = "relative"
+    normalisation: Literal["relative", "absolute"] = "absolute"
 
     @field_validator("metal")
     @classmethod

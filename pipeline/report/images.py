@@ -1,5 +1,6 @@
 """Image files: EXR for numbers, PNG for display."""
 
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,12 @@ from pipeline.errors import StorageError
 
 # ISO interop ID of linear CIE XYZ, D65 white: without it many readers take Y for luminance and Z for depth
 _XYZ_SPACE = "lin_ciexyzd65_scene"
+# sRGB with perceptual intent, and the gamma and chromaticities that the PNG specification gives for older readers
+_SRGB_CHUNKS = {
+    b"cHRM": struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000),
+    b"gAMA": struct.pack(">I", 45455),
+    b"sRGB": b"\0",
+}
 # the channels of tables: GPUs have no format of three half floats
 RGBA = ("R", "G", "B", "A")
 
@@ -88,7 +95,11 @@ def describe(path: Path) -> dict[str, Any]:
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Writes 8-bit sRGB pixels (rows, columns, 3), top row first."""
+    """Writes 8-bit sRGB pixels (rows, columns, 3), top row first, with the chunks that state their colour space."""
     from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
 
-    Image.fromarray(pixels, "RGB").save(path)
+    info = PngInfo()
+    for name, content in _SRGB_CHUNKS.items():
+        info.add(name, content)
+    Image.fromarray(pixels, "RGB").save(path, pnginfo=info)

@@ -57,5 +57,5 @@ def place(artifact: Artifact, out: Path) -> Path:
 
 def stage_of(layout: Layout) -> Stage:
     """Returns the bundle stage of a layout; its inputs are all stages before, because the manifest describes each."""
-    inputs = ("surface", layout.transform.name, "table", "render", "validate")
-    return Stage("bundle", 2, inputs, _parameters, _produce)
+    inputs = ("surface", layout.transform.name, "table", "textures", "render", "validate")
+    return Stage("bundle", 5, inputs, _parameters, _produce)

@@ -1,4 +1,4 @@
-"""The stage "render": table -> BRDF maps, one for each light, as EXR and PNG."""
+"""The stage "render": textures -> BRDF maps, one for each light, as EXR and PNG."""
 
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,12 @@ from pipeline import layouts
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.optics import geometry
-from pipeline.optics.colour import pixels
+from pipeline.optics.colour import clipped, pixels
 from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
-from pipeline.tables.evaluate import Map, render_map, table_evaluator
+from pipeline.tables.evaluate import Map, interpolator, never_negative, render_map
 
 
 def _parameters(config: Config) -> dict[str, Any]:
@@ -41,17 +41,26 @@ def map_radius(config: Config) -> float:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    evaluate = table_evaluator(layouts.of(config.table).table_of(inputs), config.radiometry)
+    interpolate = interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry)
     views, unit = Map(config.render.size, map_radius(config)), config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):
-        image = render_map(evaluate, light_direction(light), views)
+        interpolated = render_map(interpolate, light_direction(light), views)
+        image = never_negative(interpolated)
         stem = map_name(light)
         images.write_xyz(folder / f"{stem}.exr", image)
         images.write_png(folder / f"{stem}.png", pixels(image / unit, config.render.exposure_ru))
-        maps.append({**light.model_dump(), "exr": f"{stem}.exr", "png": f"{stem}.png"})
+        maps.append(
+            {
+                **light.model_dump(),
+                "exr": f"{stem}.exr",
+                "png": f"{stem}.png",
+                "negative_share": float(np.mean(np.any(interpolated[views.inside] < 0.0, axis=-1))),
+                "clipped_share": float(np.mean(clipped(image[views.inside] / unit, config.render.exposure_ru))),
+            }
+        )
         progress("maps", (i + 1) / len(config.render.lights))
     return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}
 
 
-RENDER = Stage("render", 2, ("table",), _parameters, _produce, uses_device=True)
+RENDER = Stage("render", 4, ("table", "textures"), _parameters, _produce, uses_device=True)

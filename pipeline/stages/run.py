@@ -24,7 +24,15 @@ UNCHANGED = "nothing it reads has changed"
 def stages(config: Config) -> tuple[Stage, ...]:
     """Returns the stages of a config in order; the transform of the surface and the table are the layout's own."""
     layout = layouts.of(config.table)
-    return (SURFACE, layout.transform, layout.table, RENDER, validate.stage_of(layout), bundle.stage_of(layout))
+    return (
+        SURFACE,
+        layout.transform,
+        layout.table,
+        layout.textures,
+        RENDER,
+        validate.stage_of(layout),
+        bundle.stage_of(layout),
+    )
 
 
 @dataclass(frozen=True)
@@ -184,6 +192,7 @@ def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
     texts = {
         "power_spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
         "table": layouts.of(config.table).size(config),
+        "textures": f"in {config.publish.precision}, {config.publish.textures}",
         "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
         "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",
         "bundle": "tables, maps and report",

@@ -48,11 +48,12 @@ def _measured(
     """Computes the numbers of the summary; returns them and the pictures by name, drawn by the executor."""
     field, layout = surface.of(inputs), layouts.of(config.table)
     drawn = {"surface": drawing.submit(_picture, "height_map", field)}
-    evaluate = table_evaluator(layout.table_of(inputs), config.radiometry)
+    # errors are those of the textures that a bundle holds; settings are varied of the table that they are made of
+    evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
     reference = surface.reference_of(config, inputs, progress)
     radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
     first = render.light_direction(config.render.lights[0])
-    study = layout.study(config, inputs, evaluate, convergence.CoarseMap(reference, config, first, radius))
+    study = layout.study(config, inputs, baked, convergence.CoarseMap(reference, config, first, radius))
     curves = _curves(study, progress)
     drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
     maps: list[dict[str, Any]] = []
@@ -64,7 +65,7 @@ def _measured(
         maps.append({**light.model_dump(), "colour": [asdict(error) for error in check.colour]})
     results: Summary = {
         # both were measured for the certificate
-        **{name: inputs.summary("table")["certificate"][name] for name in ("reference", "random")},
+        **{name: inputs.summary("textures")["certificate"][name] for name in ("reference", "random")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
@@ -96,5 +97,5 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
 
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
-    inputs = ("surface", layout.transform.name, "table", "render")
-    return Stage("validate", 5, inputs, _parameters, _produce, uses_device=True)
+    inputs = ("surface", layout.transform.name, "table", "textures", "render")
+    return Stage("validate", 7, inputs, _parameters, _produce, uses_device=True)

@@ -89,6 +89,9 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
     Returns HTML.
     """
     surface, table, render = (inputs.summary(name) for name in ("surface", "table", "render"))
+    # errors are those of the textures that a bundle holds
+    textures = inputs.summary("textures")
+    table = {**table, "certificate": textures["certificate"]}
     layout = layouts.of(config.table)
     return template.html(
         "pipeline.report",
@@ -97,6 +100,8 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         subtitle="Diffraction BRDF: what was baked and how far it is from the exact sum.",
         warnings=surface["warnings"],
         exposure_ru=config.render.exposure_ru,
+        colours=[*_colour_rows(config), *_stored_rows(config, textures["loss"])],
+        clamped=table["certificate"]["random"]["clamped"],
         maps=[((inputs["render"].folder / light["png"]).read_bytes(), light) for light in render["maps"]],
         surface=_surface_rows(surface),
         settings=layout.settings(inputs.summary(layout.transform.name), table),
@@ -107,6 +112,38 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         pictures=pictures,
         studied=layout.study_remark,
     )
+
+
+def _colour_rows(config: Config) -> Rows:
+    """The meaning of the colours: normalisation, unit, light and material."""
+    absolute, unit = config.material.normalisation == "absolute", config.radiometry.unit
+    illuminant = config.light.illuminant
+    return [
+        ["normalisation", config.material.normalisation],
+        ["X, Y, Z of the maps (EXR)", "a BRDF times cos θi, in 1/sr" if absolute else "in RU"],
+        [
+            "1 RU, a flat sample in its own reflection",
+            f"Y = {unit:.5g}" + (" /sr" if absolute else ""),
+        ],
+        ["pictures (PNG)", "sRGB of X, Y, Z × exposure / (Y of 1 RU), clipped to its gamut"],
+        ["light", illuminant if isinstance(illuminant, str) else f"{illuminant.lambda_nm:g} nm"],
+        ["reflectance", config.material.fresnel],
+        ["licence of the scan", config.publish.licence or "not stated"],
+    ]
+
+
+def _stored_rows(config: Config, loss: dict[str, Any] | None) -> Rows:
+    """The precision and number of the textures, and what they change of the table as baked."""
+    if loss is None:
+        return [["stored in", f"{config.publish.precision}, without loss"]]
+    if loss["layout"] == "taylor":
+        return [["stored in", f"half floats, which change colours by at most ΔE {loss['largest_delta_e']:.2g}"]]
+    mirror, verdict = loss["added_in_mirror"]["mean"], "kept" if loss["mirror_kept"] else "visibly changed"
+    return [
+        ["stored in", f"{config.publish.precision}, {loss['textures']} of {loss['most_textures']} textures"],
+        ["mean ΔE that this adds", f"{loss['added']['mean']:.3g} at {loss['added']['exposure_ru']:g} RU"],
+        ["mean ΔE in mirror directions at 1 RU", f"{mirror:.3g}: the highlight is {verdict}"],
+    ]
 
 
 def _relative_error_rows(results: dict[str, Any]) -> Rows:

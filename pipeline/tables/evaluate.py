@@ -11,7 +11,7 @@ from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.progress import Progress, silent
 
-# computes XYZ (directions, 3) at an exposure of 1 RU for unit vectors wi, wr (directions, 3)
+# computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3), in the unit of the material's normalisation
 Evaluator = Callable[[Array, Array], Array]
 _AT_ONCE = 16384
 
@@ -26,11 +26,27 @@ class Table(Protocol):
         """Computes C cos(ti) (directions,), the factors that the table does not hold, for wi, wr (directions, 3)."""
 
 
+def never_negative(xyz: Array) -> Array:
+    """Sets the negative values of interpolated XYZ (..., 3) to 0; NaN stays."""
+    return np.asarray(np.maximum(xyz, 0.0))
+
+
 def table_evaluator(table: Table, radiometry: Radiometry, progress: Progress = silent) -> Evaluator:
-    """Makes the function that computes XYZ from a table, C cos(ti) times the table's value.
+    """Makes the function that computes XYZ from a table as renderers do: `interpolator` without negative values.
+
+    Parameters and NaN are those of `interpolator`.
+    """
+    interpolate = interpolator(table, radiometry, progress)
+    return lambda wi, wr: never_negative(interpolate(wi, wr))
+
+
+def interpolator(table: Table, radiometry: Radiometry, progress: Progress = silent) -> Evaluator:
+    """Makes the function that interpolates XYZ in a table, C cos(ti) times the table's value.
+
+    Interpolation may overshoot beside bright peaks, so values may be negative.
 
     table: of any layout. radiometry: light, material and coherence window. progress: called with the share done.
-    Returns the function, which gives NaN outside the scene of the table.
+    Returns the function, which gives 0 at and below the horizon, and NaN outside the scene of the table.
     """
 
     def evaluate(wi: Array, wr: Array) -> Array:
@@ -41,6 +57,7 @@ def table_evaluator(table: Table, radiometry: Radiometry, progress: Progress = s
             part = np.s_[first : first + _AT_ONCE]
             out[part] = factor[part, None] * table.look_up(uvw[part])
             progress("look-up", min(1.0, (first + _AT_ONCE) / len(wr)))
+        out[~geometry.above_horizon(wi, wr)] = 0.0
         return out
 
     return evaluate
@@ -84,7 +101,7 @@ class Map:
 
 
 def render_map(evaluate: Evaluator, light: Array, views: Map) -> Array:
-    """Computes a map at an exposure of 1 RU.
+    """Computes a map.
 
     evaluate: computes XYZ of pairs of directions. light: unit vector (3,). views: the pixels.
     Returns XYZ (size, size, 3).

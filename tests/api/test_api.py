@@ -75,7 +75,7 @@ def test_look_up(example: tuple[Path, str], bundle: Path) -> None:
     assert len(rows) == 6
     # the mirror direction is the brightest, and darker than a mirror
     assert max(rows, key=lambda theta: rows[theta][1]) == -30.0
-    assert 0.0 < rows[-30.0][1] < 1.0
+    assert 0.0 < rows[-30.0][1] < Bundle(bundle).manifest["colour"]["mirror_y"]
 
 
 @pytest.mark.parametrize("name", ["bake_a_scan.py", "look_up.py"])
@@ -105,14 +105,12 @@ def test_a_bundle_answers_as_its_own_evaluator(bundle: Path) -> None:
     assert opened.xyz(np.empty((0, 3)), np.empty((0, 3))).shape == (0, 3)
 
 
-@pytest.mark.parametrize(
-    "wrong", [[0.0, 1.0], [[[0.0, 0.0, 1.0]]], [0.0, 0.0, 2.0], [np.nan, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]
-)
+@pytest.mark.parametrize("wrong", [[0.0, 1.0], [[[0.0, 0.0, 1.0]]], [0.0, 0.0, 2.0], [np.nan, 0.0, 1.0]])
 def test_what_is_no_direction_is_refused(bundle: Path, wrong: list[float]) -> None:
     up = [0.0, 0.0, 1.0]
     opened = Bundle(bundle)
     for pair in ((wrong, up), (up, wrong)):
-        with pytest.raises(ValueError, match=r"unit vectors|\(n, 3\)|horizon"):
+        with pytest.raises(ValueError, match=r"unit vectors|\(n, 3\)"):
             opened.xyz(*pair)
 
 

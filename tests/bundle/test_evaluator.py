@@ -19,7 +19,7 @@ from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.optics import brdf, geometry
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
-from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.evaluate import interpolator, table_evaluator
 from pipeline.tables.polar.compression import whole
 from pipeline.tables.polar.table import PolarTable
 
@@ -34,8 +34,8 @@ SEED = 3
 def both(bake: Baker, config: Config, out: Path, wi: Array, wr: Array) -> tuple[Array, Array]:
     """Computes XYZ by the bundle's evaluator and by the tool, over Y of a mirror."""
     inputs = bake(config)
-    expected = table_evaluator(layouts.of(config.table).load(inputs["table"]), config.radiometry)(wi, wr)
-    found = open_bundle(publish(config, inputs, out)).xyz(wi, wr)
+    expected = interpolator(layouts.of(config.table).load(inputs["table"]), config.radiometry)(wi, wr)
+    found = open_bundle(publish(config, inputs, out)).signed(wi, wr)
     mirror = config.radiometry.mirror_luminance(wi, wr)[:, None]
     return found / mirror, expected / mirror
 
@@ -89,13 +89,31 @@ def test_directions_outside_the_scene_are_nan(bake: Baker, tmp_path: Path, layou
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
 
 
-def test_the_horizon_is_refused(bake: Baker, tmp_path: Path) -> None:
-    xyz = open_bundle(publish(small(), bake(small()), tmp_path)).xyz
-    up, level = np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]])
-    for pair in ((up, level), (level, up)):
-        with pytest.raises(ValueError, match="horizon"):
-            xyz(*pair)
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_nothing_is_reflected_at_and_below_the_horizon(bake: Baker, tmp_path: Path, layout: str) -> None:
+    config = small(layout)
+    inputs = bake(config)
+    xyz = open_bundle(publish(config, inputs, tmp_path)).xyz
+    tool = table_evaluator(layouts.of(config.table).load(inputs["table"]), config.radiometry)
+    up, level, below = (geometry.direction(t, 0.3)[None] for t in (0.0, 0.5 * np.pi, 2.0))
+    level = level * [1.0, 1.0, 0.0]
+    for pair in itertools.product((up, level, below), repeat=2):
+        for evaluate in (xyz, tool):
+            found = evaluate(*pair)
+            lit = all(one is up for one in pair)
+            assert found[0, 1] > 0.0 if lit else np.all(found == 0.0)
+    assert np.all(xyz(below, -below) == 0.0)
     assert xyz(up[:0], up[:0]).shape == (0, 3)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_what_was_not_computed_is_dark_and_no_colour_negative(bake: Baker, tmp_path: Path, layout: str) -> None:
+    config = small(layout, scene=SCENE, render={"lights": SCENE["lights"]})
+    bundle = open_bundle(publish(config, bake(config), tmp_path))
+    pairs = random_pairs(None, 3000, SEED)
+    signed, shown = bundle.signed(*pairs), bundle.xyz(*pairs)
+    assert 0 < np.isnan(signed).sum() < signed.size
+    np.testing.assert_array_equal(shown, np.where(signed > 0.0, signed, 0.0))
 
 
 def metal(**keys: object) -> Config:
@@ -147,16 +165,18 @@ def test_it_runs_as_a_script(bundle: Path, tmp_path: Path) -> None:
     csv = tmp_path / "directions.csv"
     csv.write_text("theta_i,phi_i,theta_r,phi_r\n# a comment\n0,0,0,0\n\n30, 10, 40, -170\n60,0,0,90\n")
     done = run(bundle, csv)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
     header, *lines = done.stdout.splitlines()
     assert header == "X,Y,Z"
     wi = geometry.direction(np.radians([0, 30, 60]), np.radians([0, 10, 0]))
     wr = geometry.direction(np.radians([0, 40, 0]), np.radians([0, -170, 90]))
     found = np.array([[float(cell) for cell in line.split(",")] for line in lines])
     np.testing.assert_allclose(found, open_bundle(bundle).xyz(wi, wr), rtol=1e-11)
+    negative = int(np.sum(np.any(open_bundle(bundle).signed(wi, wr) < 0.0, axis=1)))
+    assert done.stderr == (f"{negative} of 3 rows were negative, now 0\n" if negative else "")
 
 
-@pytest.mark.parametrize("row", ["", "0,0,90,0", "1,2,3", "0,0,-1,0", "0,0,x,0", "0,nan,0,0"])
+@pytest.mark.parametrize("row", ["", "0,0,181,0", "1,2,3", "0,0,-1,0", "0,0,x,0", "0,nan,0,0"])
 def test_it_refuses_rows_that_are_not_directions(bundle: Path, tmp_path: Path, row: str) -> None:
     csv = tmp_path / "directions.csv"
     csv.write_text(f"{row}\n", encoding="utf-8")

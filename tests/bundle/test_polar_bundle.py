@@ -8,6 +8,7 @@ import OpenEXR
 import pytest
 from pydantic import TypeAdapter
 
+from pipeline.accuracy import checks
 from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
 from pipeline.bundle import polar_storage
@@ -17,9 +18,12 @@ from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, ConfigError
 from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
-from pipeline.stages import run
+from pipeline.progress import silent
+from pipeline.report import images
+from pipeline.stages import run, surface
 from pipeline.stages.polar import table as polar_table
-from pipeline.tables.evaluate import table_evaluator
+from pipeline.stages.stage import Inputs
+from pipeline.tables.evaluate import Map, table_evaluator
 
 from .conftest import SCENE, Baker, publish, small
 from .test_publish import manifest_of
@@ -80,7 +84,9 @@ def test_the_manifest_has_certificate_plan_and_stages(bake: Baker, bundle: Path)
     inputs, manifest = bake(small("polar")), manifest_of(bundle)
     assert manifest.certificate == TypeAdapter(Certificate).validate_python(inputs["table"].summary["certificate"])
     assert (manifest.plan["w_terms"], manifest.plan["windows"]) == (12, inputs["power_spectrum"].summary["windows"])
-    assert list(manifest.provenance.artifacts) == ["surface", "power_spectrum", "table", "render", "validate"]
+    assert list(manifest.provenance.artifacts) == [
+        *("surface", "power_spectrum", "table", "textures", "render", "validate")
+    ]
     assert manifest.made_by.stages.keys() == manifest.provenance.artifacts.keys()
     assert manifest.colour.step_nm is None
     assert manifest.colour.wavelengths == inputs["table"].summary["wavelengths"]
@@ -128,9 +134,9 @@ def test_a_bundle_has_the_error_that_it_states(
     wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
     table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
     evaluate = open_bundle(folder).xyz
-    mirror = wi * [-1.0, -1.0, 1.0]
+    mirror, unit = wi * [-1.0, -1.0, 1.0], small("polar").radiometry.unit
     for views, error in ((wr, loss_of(manifest).added), (mirror, loss_of(manifest).added_in_mirror)):
-        found = delta_e(evaluate(wi, views), table(wi, views), error.exposure_ru)
+        found = delta_e(evaluate(wi, views) / unit, table(wi, views) / unit, error.exposure_ru)
         assert found.mean() == pytest.approx(error.mean, rel=1e-2, abs=1e-4)
     assert f"in {textures} of 9 textures" in (folder / "README.md").read_text(encoding="utf-8")
 
@@ -185,8 +191,41 @@ def test_auto_takes_all_textures_if_no_number_keeps_the_budget(
 
     monkeypatch.setattr(polar_storage._Measure, "__call__", hopeless)
     with pytest.raises(AccuracyError, match=r'9 textures .* Set publish\.precision = "float"$'):
-        publish(budgeted(), bake(budgeted()), tmp_path)
+        # another budget than elsewhere, whose textures are in the store
+        bake(small("polar", accuracy={"delta_e": BUDGET - 0.5}, publish={"precision": "half"}))
     assert tried == list(range(1, 10))
+
+
+@pytest.mark.parametrize(("layout", "textures"), [("polar", 2), ("taylor", "auto")])
+def test_maps_and_certificate_are_those_of_the_stored_tables(
+    bake: Baker, tmp_path: Path, layout: str, textures: object
+) -> None:
+    config = small(layout, publish={"precision": "half", "textures": textures})
+    inputs = bake(config)
+    folder = publish(config, inputs, tmp_path)
+    manifest, bundle, views = manifest_of(folder), open_bundle(folder), Map(config.render.size)
+    wr = views.views()
+    own = views.image(bundle.xyz(np.broadcast_to([0.0, 0.0, 1.0], wr.shape), wr))
+    shown = images.read_xyz(folder / manifest.maps[0].file)
+    np.testing.assert_allclose(shown, own, rtol=1e-4, atol=1e-6 * own.max())
+    table = inputs["table"].summary["certificate"]
+    assert manifest.certificate.measured != table["measured"]
+    wi, wr = random_pairs(None, RANDOM_DIRECTIONS, checks._SEED)
+    found = bundle.signed(wi, wr)
+    clamped = manifest.certificate.random.clamped
+    assert clamped.share == pytest.approx(np.mean(np.any(found < 0.0, axis=1)), abs=2e-2)
+    truth = surface.reference_of(config, Inputs(inputs), silent).xyz(config.light, config.material, wi, wr)
+    unit = config.radiometry.unit
+    error = delta_e(np.maximum(found, 0.0) / unit, truth / unit, manifest.certificate.exposure_ru).mean()
+    assert manifest.certificate.measured == pytest.approx(error, rel=1e-2)
+    assert f"RU is {manifest.certificate.measured:.3g}" in (folder / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_readme_judges_a_destroyed_highlight(bake: Baker, tmp_path: Path) -> None:
+    for textures, word in ((1, "**visibly changed**"), ("full", "the highlight is kept")):
+        folder, manifest = published_with(bake, tmp_path, textures=textures, precision="half")
+        assert loss_of(manifest).mirror_kept == (textures == "full")
+        assert word in (folder / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("textures", [0, -1, 2.5, "some"])

@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from PIL import Image
 
 from pipeline.accuracy import scalar_domain
 from pipeline.bundle import checksums
 from pipeline.bundle.manifest import Manifest, TaylorGridEntry
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
+from pipeline.optics import colour
 from pipeline.report import images
 from pipeline.stages.taylor import table as taylor_table
 from pipeline.surface.periods import Period
@@ -188,3 +190,46 @@ def test_a_scene_skips_texels(bake: Baker, tmp_path: Path) -> None:
     manifest = manifest_of(publish(config, bake(config), tmp_path))
     assert manifest.coverage.skipped_share > 0.3
     assert manifest.provenance.config["scene"]["views"]["theta_max_deg"] == 45.0
+
+
+# phrases that hold in one normalisation only
+TEXT = {
+    "absolute": ("1/sr", "normalisation absolute", "Y = colour.mirror_y"),
+    "relative": ("normalisation relative", "eq. 4", "Y = 1", "are in RU", "path tracer"),
+}
+
+
+@pytest.mark.parametrize("layout", ["taylor", "polar"])
+@pytest.mark.parametrize(("held", "other"), [("absolute", "relative"), ("relative", "absolute")])
+def test_no_text_of_one_normalisation_stands_in_a_bundle_of_the_other(
+    bake: Baker, tmp_path: Path, layout: str, held: str, other: str
+) -> None:
+    config = small(layout, material={"normalisation": held})
+    folder = publish(config, bake(config), tmp_path)
+    names = ("README.md", "manifest.json", "evaluate.py")
+    texts = {name: (folder / name).read_text(encoding="utf-8") for name in names}
+    for name, text in texts.items():
+        assert f"normalisation {held}" in text, name
+        assert not [phrase for phrase in TEXT[other] if phrase in text], name
+        assert "at 1 RU)" not in text
+        assert "under 1 RU" not in text
+    stated = manifest_of(folder).colour
+    assert stated.normalisation == held
+    assert f"`mirror_y` is {stated.mirror_y:.6g}" in texts["README.md"]
+    assert stated.mirror_y == pytest.approx(config.radiometry.unit)
+    assert (stated.mirror_y > 2.0) == (held == "absolute")
+
+
+def test_the_picture_of_a_map_can_be_made_from_its_numbers(bake: Baker, tmp_path: Path) -> None:
+    """PNG = sRGB(XYZ exposure / mirror_y), to a rounding, with the chunks that say so."""
+    folder = publish(small(), bake(small()), tmp_path)
+    manifest = manifest_of(folder)
+    entry = manifest.maps[0]
+    xyz = images.read_xyz(folder / entry.file).astype(float) / manifest.colour.mirror_y
+    with Image.open(folder / entry.png) as picture:
+        found = np.asarray(picture).astype(int)
+        assert picture.info["srgb"] == 0
+        assert picture.info["gamma"] == pytest.approx(0.45455)
+        assert picture.info["chromaticity"][:2] == pytest.approx((0.3127, 0.329))
+    assert found.max() > 0
+    assert np.abs(found - colour.pixels(xyz, entry.exposure_ru)).max() <= 1

@@ -7,9 +7,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from pipeline.bundle import readme
+from pipeline.bundle import evaluator, readme
+from pipeline.bundle.verify import open_bundle
+from pipeline.optics import geometry
 
 from .conftest import LAYOUTS, Baker, publish, small
 
@@ -19,7 +22,7 @@ needs_compiler = pytest.mark.skipif(
 )
 VERSIONS = ("330", "460", "300 es", "320 es")
 MAIN = """
-float C(vec3 wi, vec3 wr) { return pow(1.0 + dot(wi, wr), 2.0) / (wi.z * wr.z * pow(wi.z + wr.z, 2.0)); }
+float R(float cos_half) { return 0.04 + 0.96 * pow(1.0 - cos_half, 5.0); }
 in vec3 light;
 in vec3 view;
 out vec4 colour;
@@ -27,8 +30,8 @@ void main() { colour = vec4(diffraction(normalize(light), normalize(view)), 1.0)
 """
 
 
-def source(layout: str) -> str:
-    return files("kernels").joinpath("shaders", f"{layout}.glsl").read_text(encoding="utf-8")
+def source(name: str) -> str:
+    return files("kernels").joinpath("shaders", f"{name}.glsl").read_text(encoding="utf-8")
 
 
 def compiled(text: str, version: str, folder: Path) -> str:
@@ -44,12 +47,13 @@ def compiled(text: str, version: str, folder: Path) -> str:
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_the_files_compile(layout: str, version: str, tmp_path: Path) -> None:
-    assert compiled(source(layout), version, tmp_path) == ""
+    assert compiled(source(layout) + source("brdf"), version, tmp_path) == ""
 
 
 @needs_compiler
 def test_a_fault_is_found(tmp_path: Path) -> None:
-    assert "ERROR" in compiled(source("polar").replace("vec4 spline", "vec3 spline"), "330", tmp_path)
+    text = (source("polar") + source("brdf")).replace("vec4 spline", "vec3 spline")
+    assert "ERROR" in compiled(text, "330", tmp_path)
 
 
 @needs_compiler
@@ -83,3 +87,64 @@ def test_a_tables_constants_replace_those_of_the_file() -> None:
 def test_other_constants_than_the_files_are_refused(constants: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"taylor\.glsl declares \['A', 'N', 'POWERS'\]"):
         readme.shader("taylor", constants)
+
+
+def in_float32(bundle: evaluator.BundleTables, wi: np.ndarray, wr: np.ndarray) -> np.ndarray:
+    """Transcribes polar.glsl and brdf.glsl, line by line and in float32, for Schlick's reflectance."""
+    f, grid, material = np.float32, bundle.manifest["grid"], bundle.manifest["material"]
+    texels = bundle.table.texels.astype(f)
+    rings, azimuths, _ = texels.shape
+    terms, outputs = grid["w_terms"], texels.shape[2]
+    uvw = -wi - wr
+    rho = np.sqrt(uvw[:, 0] ** 2 + uvw[:, 1] ** 2)
+    cos, sin = f(np.cos(grid["axis_rad"])), f(np.sin(grid["axis_rad"]))
+    turned = cos * uvw[:, 0] + sin * uvw[:, 1], cos * uvw[:, 1] - sin * uvw[:, 0]
+    ring = np.minimum(np.arcsinh(rho / f(grid["r0"])) / f(grid["step"]), f(rings - 1))
+    turn = np.where(rho > 0, np.arctan2(turned[1], f(grid["stretch"]) * turned[0]) / f(6.28318531), f(0))
+    azimuth = (turn - np.floor(turn)) * f(azimuths)
+    found = np.zeros((len(wi), outputs), f)
+    for a, across in enumerate(evaluator.spline(ring - np.floor(ring))):
+        for b, along in enumerate(evaluator.spline(azimuth - np.floor(azimuth))):
+            at = bundle.table.place(ring.astype(int) - 1 + a, azimuth.astype(int) - 1 + b)
+            found += (across * along)[:, None].astype(f) * texels[at]
+    w_max = np.sqrt(np.maximum(f(4) - rho * rho, f(1e-6)))
+    x = np.clip(f(2) * np.abs(uvw[:, 2]) / w_max - f(1), f(-1), f(1))
+    chebyshev = [np.ones_like(x), x]
+    for _ in range(2, terms):
+        chebyshev.append(f(2) * x * chebyshev[-1] - chebyshev[-2])
+    value = np.zeros((len(wi), 3), f)
+    for o in range(outputs):
+        value[:, o // terms] += found[:, o] * chebyshev[o % terms]
+    value[rho > f(grid["rho_max"]) * f(1.000001)] = 0
+    s = wi + wr
+    one_plus_dot = f(0.5) * (s[:, 0] ** 2 + s[:, 1] ** 2 + s[:, 2] ** 2)
+    over_w, f0 = one_plus_dot / s[:, 2], f(material["schlick_f0"])
+    reflected = (f0 + (f(1) - f0) * (f(1) - np.sqrt(f(0.5) * one_plus_dot)) ** 5) / f(material["divisor"])
+    c = reflected ** material["exponent"] * over_w * over_w / wr[:, 2]
+    c = c * np.minimum(f(1), f(2) * s[:, 2] * np.minimum(wi[:, 2], wr[:, 2]) / one_plus_dot)
+    xyz = np.maximum(c[:, None] * value, f(0))
+    xyz[np.minimum(wi[:, 2], wr[:, 2]) <= 0] = 0
+    assert xyz.dtype == f
+    return xyz
+
+
+def test_float32_keeps_five_digits_in_grazing_mirror_directions(bake: Baker, tmp_path: Path) -> None:
+    """1 + wi.wr would lose 7 % there. The directions are rounded to float32 for both."""
+    config = small("polar")
+    bundle = open_bundle(publish(config, bake(config), tmp_path))
+    theta = np.radians(np.concatenate([np.linspace(0.0, 89.0, 90), 90.0 - np.geomspace(1.0, 1e-3, 200)]))
+    wi = geometry.direction(theta, np.linspace(0.0, 6.0, len(theta))).astype(np.float32)
+    wr = wi * np.array([-1, -1, 1], np.float32)
+    exact = bundle.xyz(wi.astype(float), wr.astype(float))
+    assert np.all(exact > 0.0)
+    # of the colour's largest channel, because a channel may vanish
+    error = np.abs(in_float32(bundle, wi, wr) - exact) / exact.max(axis=1, keepdims=True)
+    assert error.max() < 1e-5
+
+
+def test_float32_is_dark_at_and_below_the_horizon(bake: Baker, tmp_path: Path) -> None:
+    bundle = open_bundle(publish(small("polar"), bake(small("polar")), tmp_path))
+    up, level, below = (np.array([v], np.float32) for v in ([0, 0, 1], [1, 0, 0], [0.6, 0, -0.8]))
+    with np.errstate(all="ignore"):
+        for wi, wr in ((up, level), (level, up), (level, -level), (up, below), (below, up), (below, -below)):
+            assert np.all(in_float32(bundle, wi, wr) == 0.0)

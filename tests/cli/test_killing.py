@@ -10,7 +10,7 @@ import pytest
 from tests.cli.tool import Tool, temporary_files
 from tests.support import killed_at
 
-STAGES = ["surface", "stack", "table", "render", "validate"]
+STAGES = ["surface", "stack", "table", "textures", "render", "validate"]
 
 pytestmark = pytest.mark.slow
 

@@ -2,7 +2,7 @@
 
 from tests.cli.tool import Tool
 
-STAGES = ["surface", "stack", "table", "render", "validate", "bundle"]
+STAGES = ["surface", "stack", "table", "textures", "render", "validate", "bundle"]
 
 
 def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> None:
@@ -12,8 +12,8 @@ def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> No
     lines = result.stdout.splitlines()
     assert lines[0] == "small:"
     assert lines[1].split() == ["stage", "state", "cost"]
-    assert [line.split()[:3] for line in lines[2:8]] == [[stage, "to", "do"] for stage in STAGES]
-    assert lines[8:14] == [f"{stage}: not made before" for stage in STAGES]
+    assert [line.split()[:3] for line in lines[2:9]] == [[stage, "to", "do"] for stage in STAGES]
+    assert lines[9:16] == [f"{stage}: not made before" for stage in STAGES]
     assert sorted(path.name for path in tool.folder.iterdir()) == ["small.toml"]
 
 
@@ -29,10 +29,10 @@ def test_after_a_run_all_is_cached(baked: Tool) -> None:
 def test_a_changed_key_is_named_with_both_values_and_its_consequences(copy: Tool) -> None:
     before = copy.artifacts()
     steps = {s["stage"]: s for s in copy("plan", copy.config(table={"tolerance": 0.01}), "--json").json["small"]}
-    assert [steps[stage]["state"] for stage in STAGES] == ["cached", *["to do"] * 5]
+    assert [steps[stage]["state"] for stage in STAGES] == ["cached", *["to do"] * 6]
     assert steps["stack"]["reason"] == "changed: tolerance 0.0001 -> 0.01"
     assert steps["table"]["reason"] == "changed: table.tolerance 0.0001 -> 0.01"
-    assert steps["render"]["reason"] == "its input will be made: table"
+    assert steps["render"]["reason"] == "its input will be made: table, textures"
     assert steps["validate"]["reason"] == "its input will be made: render, stack, table"
     assert copy.artifacts() == before
 

@@ -12,7 +12,7 @@ from tests.cli.tool import SMALL, Tool, temporary_files, toml
 
 pytestmark = pytest.mark.slow
 
-STAGES = ["surface", "power_spectrum", "table", "render", "validate", "bundle"]
+STAGES = ["surface", "power_spectrum", "table", "textures", "render", "validate", "bundle"]
 POLAR: dict[str, Any] = {
     **SMALL,
     "surface": {"recipe": {"kind": "elaphe", "size_um": 10, "pitch_um": 0.1}},

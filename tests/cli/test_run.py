@@ -9,7 +9,7 @@ from PIL import Image
 from pipeline.report import images
 from tests.cli.tool import Result, Tool, files, temporary_files, too_wide
 
-STAGES = ["surface", "stack", "table", "render", "validate", "bundle"]
+STAGES = ["surface", "stack", "table", "textures", "render", "validate", "bundle"]
 
 
 def test_makes_maps_report_and_bundle(baked: Tool) -> None:

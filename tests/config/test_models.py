@@ -46,7 +46,7 @@ def test_left_out_sections_take_their_documented_defaults(tmp_path):
     assert config.light.observer == "CIE 1931 2 Degree Standard Observer"
     assert config.light.range_nm == (380.0, 780.0)
     assert (config.material.fresnel, config.material.ior, config.material.metal) == ("schlick", 1.5, "Au")
-    assert (config.material.shadowing, config.material.normalisation) == (True, "relative")
+    assert (config.material.shadowing, config.material.normalisation) == (True, "absolute")
     assert config.table == PolarLayout(terms="auto", rings="auto", azimuths="auto", w_terms="auto")
     assert config.budget_delta_e == 0.1
     assert config.accuracy.exposure_ru == 7500.0

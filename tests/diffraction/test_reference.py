@@ -6,6 +6,7 @@ import pytest
 from pipeline.diffraction.reference import Reference, power_direct, xyz_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import brdf, geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.light import LaserLine, Light, trapezoid
 from pipeline.optics.material import Material
@@ -128,7 +129,7 @@ def test_the_power_of_a_direction_does_not_depend_on_the_other_directions() -> N
 
 def test_frequencies_beyond_the_nyquist_limit_count_as_dark() -> None:
     """XYZ of a direction is the integral over the wavelengths within the limit."""
-    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Light(), Material()
+    field, light, material = rough(32, 32, (0.3, 0.3), 0.1), Light(), Material(normalisation="relative")
     wi, wr = np.array([[0.0, 0.0, 1.0]]), geometry.direction(np.array([np.radians(65.0)]), np.array([0.0]))
     rule = trapezoid(light, 1.0)
     power = Reference(field, 2.0, 380.0).power(geometry.uvw(wi, wr), rule.lambda_nm)
@@ -215,22 +216,34 @@ def test_a_mirror_at_normal_incidence_has_one_ru() -> None:
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
     straight = np.array([[0.0, 0.0, 1.0]])
     for fresnel in ("none", "schlick", "dielectric", "conductor"):
-        xyz = reference.xyz(Light(), Material(fresnel=fresnel), straight, straight)
+        material = Material(fresnel=fresnel, normalisation="relative")
+        xyz = reference.xyz(Light(), material, straight, straight)
         assert xyz[0, 1] == pytest.approx(1.0, abs=1e-12)
 
 
 def test_one_ru_is_a_mirror_in_both_normalisations() -> None:
-    """In units of a perfect mirror's peak, absolute and relative values are equal for a laser line."""
+    """In RU, absolute and relative values of a perfect mirror are equal for a laser line."""
     spectrum, straight = Light(illuminant=LaserLine(lambda_nm=532.0)), np.array([[0.0, 0.0, 1.0]])
     reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 532.0)
     wi, wr = pairs(20)
     found = []
     for normalisation in ("relative", "absolute"):
         material = Material(fresnel="none", normalisation=normalisation)
-        unit = brdf.relative_unit(material, trapezoid(spectrum, 1.0), 1.0)
+        unit = Radiometry(spectrum, material, 1.0, 1.0).unit
         assert reference.xyz(spectrum, material, straight, straight)[0, 1] / unit == pytest.approx(1.0, rel=1e-12)
         found.append(reference.xyz(spectrum, material, wi, wr) / unit)
     np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("fresnel", ["none", "schlick", "dielectric", "conductor"])
+@pytest.mark.parametrize("normalisation", ["relative", "absolute"])
+def test_one_ru_is_a_flat_sample_that_mirrors_along_its_normal(fresnel: str, normalisation: str) -> None:
+    """Exposures and error budgets in RU mean the same in both normalisations, for every material."""
+    reference = Reference(HeightField(np.zeros((64, 64)), (0.1, 0.1)), 1.0, 380.0)
+    material, straight = Material(fresnel=fresnel, normalisation=normalisation), np.array([[0.0, 0.0, 1.0]])
+    unit = Radiometry(Light(), material, 1.0).unit
+    assert reference.xyz(Light(), material, straight, straight)[0, 1] / unit == pytest.approx(1.0, rel=1e-9)
+    assert normalisation == "absolute" or unit == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 40.0])

@@ -66,7 +66,7 @@ def test_relative_follows_the_papers_equation():
     Light at 60 degrees, view along the normal: wi.wr = 1/2, w = -3/2, G = 1.5^2 / 0.5 = 4.5,
     cos^2 of the half angle 3/4.
     """
-    material = Material(fresnel="schlick", ior=1.5, shadowing=False)
+    material = Material(fresnel="schlick", ior=1.5, shadowing=False, normalisation="relative")
     f_over_f0 = (0.04 + 0.96 * (1.0 - np.sqrt(0.75)) ** 5) / 0.04
     expected = f_over_f0**2 * 4.5 * 0.5 / 1.5**2
     assert brdf.direction_factor(material, WHITE, tilted(60.0), NORMAL) == pytest.approx(expected, rel=1e-12)

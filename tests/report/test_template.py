@@ -5,6 +5,8 @@ from typing import Any
 import pytest
 from jinja2 import UndefinedError
 
+from pipeline.accuracy.checks import Clamped
+from pipeline.optics.colour import ColourError
 from pipeline.report import template
 
 VALUES: dict[str, Any] = {
@@ -12,7 +14,9 @@ VALUES: dict[str, Any] = {
     "subtitle": "1 < 2",
     "warnings": ["<script>alert(1)</script>"],
     "exposure_ru": 7500.0,
-    "maps": [(b"\x89PNG", {"theta_deg": 30.0, "phi_deg": 0.0})],
+    "maps": [(b"\x89PNG", {"theta_deg": 30.0, "phi_deg": 0.0, "clipped_share": 0.25, "negative_share": 0.0})],
+    "colours": [],
+    "clamped": Clamped(0.1, ColourError(7500.0, 0.01, 0.1, 1.0)),
     "surface": [["<i>", "2 µm"]],
     "settings": [],
     "error_columns": ["where"],
@@ -34,7 +38,7 @@ def test_pages_escape_what_they_show() -> None:
         "<td>&lt;i&gt;</td><td>2 µm</td>",
         "&lt;script&gt;",
         "base64,iVBORw==",
-        "<figcaption>θ = 30°, φ = 0°</figcaption>",
+        "<figcaption>Light at θ = 30°, φ = 0°. Clipped to sRGB: 25 % of the views; negative, set to 0: 0 %.",
     ):
         assert text in page
 

@@ -10,6 +10,7 @@ from pipeline.evaluation import results
 from pipeline.evaluation.figures import html, pages
 from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.figures.pages import Made
+from pipeline.evaluation.sources import as_published
 from pipeline.progress import Progress
 from pipeline.stages import run as stages
 from pipeline.stages import surface
@@ -66,7 +67,7 @@ def _configs(given: Mapping[str, tuple[Config, str]]) -> dict[str, Config]:
         if config.light.is_line:
             fault = f"expected a range of wavelengths, whose colours are compared, got a laser line; see --{role}"
             raise ConfigError(file, [("spectrum.illuminant", fault)])
-        found[role] = config
+        found[role] = as_published(config)
     return found
 
 

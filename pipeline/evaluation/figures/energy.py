@@ -36,7 +36,7 @@ _MIRROR_DEG, _JUDGED_MIRROR = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0), 60.0
 _ANGLES_DEG, _FEWER_DEG = np.arange(0.0, 80.1, 5.0), np.array([0.0, 40.0])
 _CLEAR_DEG, _SHOWN_DEG = (0.0, 40.0, 60.0), (0.0, 20.0, 40.0, 60.0, 75.0)
 _MATERIALS = {
-    "schlick": ("Schlick, n = 1.5, shadowing", Material()),
+    "schlick": ("Schlick, n = 1.5, shadowing", Material(normalisation="relative")),
     "gold": ("gold, absolute", Material(fresnel="conductor", shadowing=False, normalisation="absolute")),
 }
 

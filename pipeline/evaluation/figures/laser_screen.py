@@ -88,7 +88,7 @@ def experiment(config: Config) -> Config:
         update={
             "coherence": Coherence(sigma_um=APERTURE_UM / 4.0),
             "light": Light(illuminant=laser),
-            "material": Material(fresnel="conductor", metal="Au"),
+            "material": Material(fresnel="conductor", metal="Au", normalisation="relative"),
             "table": PolarLayout(),
             "accuracy": Accuracy(delta_e=DELTA_E),
             "scene": Scene(lights=[LIGHT]),

@@ -11,7 +11,7 @@ from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.plots import map_plots
 from pipeline.evaluation.plots.map_plots import Panel
 from pipeline.optics import geometry
-from pipeline.optics.colour import DISPLAY_GAMMA, delta_e, displayed_srgb, pixels
+from pipeline.optics.colour import delta_e, displayed_srgb, pixels
 from pipeline.progress import Progress
 from pipeline.surface.recipes.parameters import Blazed
 from pipeline.tables.evaluate import Map
@@ -25,7 +25,7 @@ NOTICEABLE = 1.0
 XENOPELTIS_RHO = (0.25, 0.5)
 _SIZE, _QUICK_SIZE = 201, 61
 # one of 255 steps of a channel, linear: below it a pixel is black
-_LIT = (1.0 / 255.0) ** DISPLAY_GAMMA
+_LIT = (1.0 / 255.0) ** 2.2
 # (theta, phi) in degrees
 Light = tuple[float, float]
 NORMAL: Light = (0.0, 0.0)
@@ -76,4 +76,4 @@ def panel(views: Map, xyz_ru: Array, title: str, note: str = "") -> Panel:
 
 def sheet(rows: Sequence[Sequence[Panel]], heading: str, row_names: Sequence[str] = ()) -> bytes:
     """Draw maps in rows under a heading that names their exposure, PNG."""
-    return map_plots.sheet(rows, f"{heading}, {SHOWN_RU:g} RU, gamma 2.2", row_names)
+    return map_plots.sheet(rows, f"{heading}, {SHOWN_RU:g} RU, sRGB", row_names)

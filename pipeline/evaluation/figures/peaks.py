@@ -29,7 +29,7 @@ from pipeline.surface.heightfield import HeightField
 Power = Callable[[Array, Array], Array]
 
 # [D14] eq. 4 has no shadowing
-BRDF = Material(shadowing=False)
+BRDF = Material(shadowing=False, normalisation="relative")
 # Schlick's term needs no wavelengths
 _NO_LIGHT = Quadrature(np.empty(0), np.empty((0, 3)))
 _GRID_STEPS = 4  # a sigma_f: a parabola through three such samples of a Gaussian's logarithm is exact

@@ -10,6 +10,7 @@ from typing import Any
 from pipeline.config.models import Config
 from pipeline.evaluation import results
 from pipeline.evaluation.check import Check
+from pipeline.evaluation.sources import as_published
 from pipeline.evaluation.speed import checks, constants, machine, memory, processes, setting, suite, truth
 from pipeline.evaluation.speed.constants import Constant
 from pipeline.evaluation.speed.machine import Machine, share
@@ -88,7 +89,7 @@ def run(
     """
     note("device:")
     limits, found = machine.measure(), []
-    for config, path in configs:
+    for config, path in ((as_published(config), path) for config, path in configs):
         note(f"{config.name}:")
         each = suite.run(config, _field(config, store, progress), QUICK if quick else FULL, progress)
         found.append(each if quick else _with_whole_run(each, command_line, path, progress))

@@ -22,6 +22,7 @@ from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour import delta_e
 from pipeline.optics.light import Quadrature
+from pipeline.optics.material import Material
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import run, surface
 from pipeline.store.store import Store
@@ -167,7 +168,8 @@ def _config(case: StressCase, heights: Path) -> Config:
     else:
         source = SurfaceSource(path=str(heights), height_unit="um", pitch_um=case.pitch_um, level="none")
     coherence, accuracy = Coherence(sigma_um=case.sigma_um), Accuracy(delta_e=TABLE_DELTA_E)
-    return Config(name="stress", surface=source, coherence=coherence, accuracy=accuracy)
+    material = Material(normalisation="relative")
+    return Config(name="stress", surface=source, coherence=coherence, material=material, accuracy=accuracy)
 
 
 def _extreme_pairs() -> tuple[Array, Array]:

@@ -5,10 +5,8 @@ from typing import TYPE_CHECKING
 
 from pipeline.accuracy.convergence import CoarseMap, PolarStudy, Study
 from pipeline.config.models import Config
-from pipeline.progress import silent
-from pipeline.stages import surface
 from pipeline.stages.layout import Layout
-from pipeline.stages.polar import power_spectrum, table
+from pipeline.stages.polar import power_spectrum, table, textures
 from pipeline.stages.stage import Inputs, Summary
 from pipeline.tables.evaluate import Evaluator
 
@@ -46,7 +44,8 @@ def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
         ["outside the scene", f"{100 * table['skipped_share']:.1f} %"],
         [
             f"certificate: mean ΔE at {certificate['exposure_ru']:g} RU",
-            f"{certificate['measured']:.3f} of {certificate['delta_e']:g} allowed",
+            f"{certificate['measured']:.3f}"
+            + ("" if certificate["delta_e"] is None else f" of {certificate['delta_e']:g} allowed"),
         ],
     ]
 
@@ -56,18 +55,19 @@ def _prepare(config: Config, inputs: Inputs) -> "Prepared":
 
     return polar.prepare(
         config,
-        table.of(inputs),
-        lambda: surface.reference_of(config, inputs, silent),
+        textures.of(inputs),
+        inputs.summary("textures"),
         {key: inputs.summary("power_spectrum").get(key) for key in _PLANNED},
-        inputs.summary("table")["certificate"],
     )
 
 
 LAYOUT = Layout(
     transform=power_spectrum.POWER_SPECTRUM,
     table=table.TABLE,
+    textures=textures.TEXTURES,
     load=table.load,
     table_of=table.of,
+    stored_of=textures.table_of,
     size=_size,
     study=_study,
     study_remark="Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked.",

@@ -15,7 +15,7 @@ from pipeline.stages.polar import power_spectrum
 from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
-from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.evaluate import interpolator
 from pipeline.tables.polar import table as polar
 
 _FILE = "table.zarr"
@@ -41,7 +41,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     light = config.radiometry.illumination(config.table.mean_step_nm)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light)
     reference = surface.reference_of(config, inputs, progress)
-    certified = certificate.certify(table_evaluator(table, config.radiometry), reference, config, progress)
+    certified = certificate.certify(interpolator(table, config.radiometry), reference, config, progress)
     has_spectral_form = power_spectrum.layout_of(config).form == "spectral"
     spectral = certificate.certify_spectral(power, reference, config) if has_spectral_form else None
     arrays.save(
@@ -80,10 +80,13 @@ def of(inputs: Inputs) -> polar.PolarTable:
 
 def load(artifact: Artifact) -> polar.PolarTable:
     """Reads the table of an artifact of this stage."""
-    zarr = artifact.folder / _FILE
-    found = arrays.attributes(zarr)
-    grid = PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
-    return polar.PolarTable(arrays.load(zarr, "table"), grid)
+    return polar.PolarTable(arrays.load(artifact.folder / _FILE, "table"), grid_of(artifact))
 
 
-TABLE = Stage("table", 4, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)
+def grid_of(artifact: Artifact) -> PolarGrid:
+    """Returns the grid in the record of an artifact of this stage."""
+    found = artifact.summary
+    return PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
+
+
+TABLE = Stage("table", 6, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)

@@ -6,7 +6,7 @@ from pipeline.accuracy.convergence import CoarseMap, Study, TaylorStudy
 from pipeline.config.models import Config
 from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Summary
-from pipeline.stages.taylor import stack, table
+from pipeline.stages.taylor import stack, table, textures
 from pipeline.tables.evaluate import Evaluator
 
 if TYPE_CHECKING:
@@ -48,16 +48,18 @@ def _prepare(config: Config, inputs: Inputs) -> "Prepared":
     return taylor.prepare(
         config,
         table.of(inputs),
+        inputs.summary("textures"),
         {key: inputs.summary("stack").get(key) for key in _PREDICTED},
-        inputs.summary("table")["certificate"],
     )
 
 
 LAYOUT = Layout(
     transform=stack.STACK,
     table=table.TABLE,
+    textures=textures.TEXTURES,
     load=table.load,
     table_of=table.of,
+    stored_of=textures.table_of,
     size=_size,
     study=_study,
     study_remark="Terms and step are varied at the directions of the map itself, without a grid.",

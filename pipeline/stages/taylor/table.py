@@ -14,7 +14,7 @@ from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_p
 from pipeline.stages.taylor import stack
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
-from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.evaluate import interpolator
 from pipeline.tables.taylor import grid
 from pipeline.tables.taylor import table as taylor
 
@@ -51,8 +51,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {"power": table.power, "channels": ["X", "Y", "Z"]},
     )
     inside = np.hypot(nodes[:, None], nodes) <= grid.U_MAX
-    evaluate = table_evaluator(table, config.radiometry)
-    certified = certificate.measure(evaluate, surface.reference_of(config, inputs, progress), config, progress)
+    interpolate = interpolator(table, config.radiometry)
+    certified = certificate.measure(interpolate, surface.reference_of(config, inputs, progress), config, progress)
     inputs.session.keep("table", table)
     return {
         "layout": "taylor",
@@ -78,4 +78,4 @@ def load(artifact: Artifact) -> taylor.TaylorTable:
     return taylor.TaylorTable(values, computed, unknown, float(arrays.attributes(zarr)["power"]))
 
 
-TABLE = Stage("table", 2, ("surface", "stack"), _parameters, _produce, uses_device=True)
+TABLE = Stage("table", 3, ("surface", "stack"), _parameters, _produce, uses_device=True)

@@ -115,7 +115,7 @@ def start(
     amplitude = AMPLITUDE_SHARE * budget.delta_e
     z_luminous = z * lambda_min / _middle_nm(probing)
     bake = PolarBake(
-        radiometry=Radiometry(probing, Material(), sigma_um),
+        radiometry=Radiometry(probing, Material(normalisation="relative"), sigma_um),
         lambda_min_nm=lambda_min,
         rho_max=rho_max(scene),
         spacing=_spacing(probing),

@@ -15,6 +15,7 @@ computed again.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from kernels import cubic_spline
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.optics import geometry
+from pipeline.optics.brdf import Radiometry
 from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Scene
 from pipeline.tables.polar.table import PolarTable, w_position
@@ -76,6 +78,23 @@ class Textures:
     def count(self) -> int:
         """Number of RGBA textures."""
         return int(self.values.shape[1]) // CHANNELS
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the textures."""
+        return self.values.nbytes
+
+    def look_up(self, uvw: Array) -> Array:
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the rings."""
+        return self.envelope.at(np.hypot(uvw[:, 0], uvw[:, 1]))[:, None] * self._reconstructed.look_up(uvw)
+
+    def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+        """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3), as a polar table does."""
+        return self._reconstructed.direction_factor(radiometry, wi, wr)
+
+    @cached_property
+    def _reconstructed(self) -> PolarTable:
+        return self.table()
 
     def table(self) -> PolarTable:
         """Reconstructs the polar table, without the envelope; multiply look-ups by `envelope.at(rho)`."""

@@ -22,8 +22,10 @@ from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.spectral_integral import Reflectance
 
-# at the rim both |w| and w_max vanish: the divisor must exceed the rounding of 4 - rho^2 in float64
-_LEAST_W_MAX = np.sqrt(1e-9)
+# at the rim both |w| and w_max vanish: the divisor must exceed the rounding of 4 - rho^2 in the float32 of shaders
+_LEAST_W_MAX = 1e-3
+# rounding, in float32 as well, may place a direction on the rim beyond the last ring
+_RIM = 1.0 + 1e-6
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,7 @@ class PolarTable:
         rings, azimuths = self.grid.rings, self.grid.azimuths
         rho = np.hypot(uvw[:, 0], uvw[:, 1])
         ring = rings.ring_from_rho(rho)
-        # rounding may place a direction on the rim beyond the last ring
-        inside = ring <= rings.count - 1 + 1e-6
+        inside = rho <= rings.rho_max * _RIM
         place = (
             np.clip(ring, 0.0, rings.count - 1.0),
             azimuths.azimuth_from_uv(uvw[:, :2]),

@@ -30,6 +30,7 @@ def surface(kind: str, light: dict[str, object] | None = None, **recipe: object)
     made = {"kind": kind, "size_um": SIZE_UM, "pitch_um": PITCH_UM, **recipe}
     config = Config.model_validate(
         {
+            "material": {"normalisation": "relative"},
             "name": kind,
             "surface": {"recipe": made},
             "coherence": {"sigma_um": SIGMA_UM},

@@ -19,6 +19,7 @@ from pipeline.evaluation.methods.stam_bumps import (
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import make
 from pipeline.surface.recipes.parameters import Blazed, Elaphe, Mirror
@@ -30,6 +31,7 @@ BUMPS = [RectangularBump(0.13, 0.5, 0.25), TriangularBump(0.31, 0.5, 0.25)]
 
 def config_of(sigma_um: float, **sections: object) -> Config:
     surface = SurfaceSource(recipe=Mirror(kind="mirror"))
+    sections = {"material": Material(normalisation="relative"), **sections}
     coherence = Coherence(sigma_um=sigma_um)
     return Config(name="test", surface=surface, coherence=coherence, **sections)
 

@@ -1,0 +1,93 @@
+"""The stage "textures": table -> the textures that a bundle holds, with the certificate of what they hold."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.config.models import Config
+from pipeline.progress import Progress
+from pipeline.stages import surface
+from pipeline.stages.polar import table
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.store import arrays
+from pipeline.tables.evaluate import Table
+from pipeline.tables.polar.compression import Envelope, Textures, whole
+
+if TYPE_CHECKING:
+    from pipeline.bundle.polar_storage import Stored
+
+_FILE = "textures.zarr"
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    return {
+        "kernels": kernel_digest("cubic_spline.cl", "dft_stack.cl", "exact_power.cl"),
+        "precision": config.publish.precision,
+        "textures": config.publish.textures,
+        "spectrum": light_parameters(config),
+        "material": material_parameters(config),
+        "accuracy": config.accuracy.model_dump(mode="json"),
+        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+    }
+
+
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    from pipeline.bundle import polar_storage
+
+    certificate = inputs.summary("table")["certificate"]
+    if polar_storage.is_whole(config):
+        return {"loss": None, "certificate": certificate}
+    reference = surface.reference_of(config, inputs, progress)
+    stored, loss, random = polar_storage.choose(config, table.of(inputs), reference)
+    arrays.save(
+        folder / _FILE,
+        {
+            "texels": arrays.Named(stored.values, ("rho", "output", "phi"), "1"),
+            "scale": arrays.Named(stored.scale, ("output",), "1"),
+            "basis": arrays.Named(stored.textures.basis, ("output", "channel", "w_term"), "1"),
+        },
+        {"envelope": asdict(stored.textures.envelope)},
+    )
+    inputs.session.keep("textures", stored)
+    measured = polar_storage.mean_error(random, config)
+    kept = measured <= config.budget_delta_e
+    return {
+        "loss": loss.model_dump(mode="json"),
+        "certificate": {
+            **certificate,
+            "delta_e": config.budget_delta_e if kept else None,
+            "measured": measured,
+            "random": asdict(random),
+        },
+    }
+
+
+def of(inputs: Inputs) -> "Stored":
+    """Returns the stored textures of a stage's inputs."""
+    from pipeline.bundle import polar_storage
+
+    if inputs.summary("textures")["loss"] is None:
+        return polar_storage.store(whole(table.of(inputs)), "float")
+    return inputs.session.get("textures", lambda: _load(inputs))
+
+
+def table_of(inputs: Inputs) -> Table:
+    """Returns the table that the stored textures hold."""
+    if inputs.summary("textures")["loss"] is None:
+        return table.of(inputs)
+    return of(inputs).textures
+
+
+def _load(inputs: Inputs) -> "Stored":
+    from pipeline.bundle.polar_storage import Stored
+
+    zarr = inputs["textures"].folder / _FILE
+    values, scale, basis = (arrays.load(zarr, name) for name in ("texels", "scale", "basis"))
+    envelope = Envelope(**arrays.attributes(zarr)["envelope"])
+    found = Textures(values.astype(np.float32), basis, table.grid_of(inputs["table"]), envelope)
+    return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
+
+
+TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True)

@@ -1,0 +1,53 @@
+"""The stage "textures": table -> the precision in which a bundle holds it, with the certificate of what it holds."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pipeline.accuracy import certificate
+from pipeline.config.models import Config
+from pipeline.progress import Progress
+from pipeline.stages import surface
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.stages.taylor import table
+from pipeline.tables.evaluate import interpolator
+from pipeline.tables.taylor.table import TaylorTable
+
+
+def _parameters(config: Config) -> dict[str, Any]:
+    return {
+        "kernels": kernel_digest("dft_stack.cl", "exact_power.cl"),
+        "precision": config.publish.precision,
+        "spectrum": light_parameters(config),
+        "material": material_parameters(config),
+        "accuracy": config.accuracy.model_dump(mode="json"),
+        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+    }
+
+
+def _produce(config: Config, inputs: Inputs, _folder: Path, progress: Progress) -> Summary:
+    if config.publish.precision == "float":
+        return {"loss": None, "certificate": inputs.summary("table")["certificate"]}
+    from pipeline.bundle import taylor_storage
+
+    baked = table.of(inputs)
+    scale = taylor_storage.scales(baked, "half")
+    loss = taylor_storage.measure(config, baked, scale)
+    rounded = taylor_storage.in_half(baked, scale)
+    reference = surface.reference_of(config, inputs, progress)
+    certified = certificate.measure(interpolator(rounded, config.radiometry), reference, config, progress)
+    inputs.session.keep("textures", rounded)
+    return {"loss": loss.model_dump(mode="json"), "certificate": asdict(certified)}
+
+
+def table_of(inputs: Inputs) -> TaylorTable:
+    """Returns the table that the stored textures hold."""
+    baked = table.of(inputs)
+    if inputs.summary("textures")["loss"] is None:
+        return baked
+    from pipeline.bundle import taylor_storage
+
+    return inputs.session.get("textures", lambda: taylor_storage.in_half(baked, taylor_storage.scales(baked, "half")))
+
+
+TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True)
