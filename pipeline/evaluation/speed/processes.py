@@ -67,8 +67,6 @@ class CommandLine:
             environment = dict(os.environ)
             if cache is not None:
                 environment["XDG_CACHE_HOME"] = str(cache)
-                # this process has set it for PoCL
-                environment.pop("POCL_CACHE_DIR", None)
             with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
                 started = time.perf_counter()
                 process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment)
