@@ -41,7 +41,7 @@ def process() -> None:
     if command == 0:
         os.close(lifeline)
         _follow(supervisor, alive)
-        _run(awaited, notes, foreign)
+        _run(notes, foreign)
     os.close(alive)
     while True:
         received = signal.sigwait({*awaited, signal.SIGCHLD})
@@ -82,7 +82,7 @@ def _follow(supervisor: int, alive: int) -> None:
         os._exit(1)
 
 
-def _run(awaited: set[signal.Signals], notes: int, foreign: int) -> None:
+def _run(notes: int, foreign: int) -> None:
     """Runs the command and ends this process, without the interpreter's cleanup.
 
     The cleanup of hundreds of MB takes a fifth of a second, and nothing depends on it: files are closed and locks
@@ -90,7 +90,7 @@ def _run(awaited: set[signal.Signals], notes: int, foreign: int) -> None:
     """
     # the keyboard's interrupt reaches this process and its children as well, and the supervisor ends them
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {*awaited, signal.SIGINT, signal.SIGCHLD})
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {*_ENDED_BY, signal.SIGCHLD})
     code: str | int | None = 1
     try:
         from cli import console
