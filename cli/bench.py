@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     Results = SpeedResults | StabilityResults | FigureResults
 
-_PROCESS = "from cli.entry import process; process()"
+# starts the tool in a process of its own; -P: nothing is imported from the working folder
+COMMAND_LINE = (sys.executable, "-P", "-c", "from cli.entry import process; process()")
 
 
 def _out_option(default: str, files: str) -> Callable[..., Any]:
@@ -54,7 +55,7 @@ def speed_command(
     from pipeline.store import scratch
 
     scratch.require_folder(out)
-    command_line = CommandLine((sys.executable, "-P", "-c", _PROCESS))
+    command_line = CommandLine(COMMAND_LINE)
     with nullcontext(config_paths) if config_paths else bench.built_in() as paths:
         configs = [(sources.load(path), path) for path in paths]
         with console.showing_progress() as progress:

@@ -30,7 +30,7 @@ def keep_stderr(foreign: int) -> None:
     global _messages
     if sys.stderr is not None:
         own = os.dup(sys.stderr.fileno())
-        _messages = open(own, "w", buffering=1, encoding=sys.stderr.encoding, errors="backslashreplace")
+        _messages = os.fdopen(own, "w", buffering=1, encoding=sys.stderr.encoding, errors="backslashreplace")
     os.dup2(foreign, 2)
 
 
@@ -127,8 +127,7 @@ def note(text: str) -> None:
 
 def usage_error(error: click.ClickException) -> None:
     """Prints a fault of the command line to stderr: usage, and the message as one line."""
-    error.message = escaped(error.message)
-    error.show(_messages)
+    click.UsageError(escaped(error.format_message()), getattr(error, "ctx", None)).show(_messages)
 
 
 def warning_reporter(config: Any, store: Any) -> Callable[[Any, float | None], None]:

@@ -25,7 +25,7 @@ _FINISHED = b"finished"
 
 
 def process() -> None:
-    """Runs the command in a child process and ends this process with its exit code, or with 128 + a signal's number."""
+    """Runs the command in a child process and ends with its exit code, or with 128 + the number of a signal."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {*_ENDED_BY, signal.SIGCHLD})
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     # those that the caller ignores, as nohup does, are not waited for
@@ -51,7 +51,7 @@ def process() -> None:
             break
         ended, status = os.waitpid(command, os.WNOHANG)
         if ended:
-            received = os.WTERMSIG(status) if os.WIFSIGNALED(status) else None
+            received = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
             break
     *folders, last = _content(notes).split(b"\0")
     _remove(folders)
@@ -147,7 +147,7 @@ def _remove(folders: list[bytes]) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _crashed(received: int | None, foreign: bytes) -> int:
+def _crashed(received: int, foreign: bytes) -> int:
     """Reports a command that a library has ended, and returns the exit code."""
     from cli.console import escaped
 
@@ -156,7 +156,7 @@ def _crashed(received: int | None, foreign: bytes) -> int:
     if os.strerror(errno.ENOSPC) in last:
         _print(f"error: no space left to write; free some ({last})")
         return 7
-    how = "a library ended the process" if received is None else f"{signal.Signals(received).name} ended the process"
+    how = "a library ended the process" if not received else f"{signal.Signals(received).name} ended the process"
     if received == signal.SIGKILL:
         _print(f"error: {how}; the system does that where memory is short")
     else:

@@ -4,14 +4,15 @@
     <folder>/compiled/...   one record per program or kernel: the files that compiling it made, with their digests
     <folder>/...            PoCL's files: program.bc of each program, a shared object of each kernel
 
-PoCL loads what it finds there unchecked and does not sync what it writes: after a power loss, or with one bit flipped,
-it crashes or computes other numbers.
+PoCL loads what it finds there unchecked and does not sync what it writes: after a power loss, or with one bit
+flipped, it crashes or computes other numbers.
 """
 
 import errno
 import hashlib
 import json
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
@@ -103,12 +104,14 @@ class KernelCache:
     def _vouched(self, record: Path) -> set[str] | None:
         """Return the files that a record names, None where one of them or the record itself is not as written."""
         try:
+            if not stat.S_ISREG(record.lstat().st_mode):
+                return None
             files = json.loads(record.read_bytes())
             for name, (size, digest) in files.items():
                 status = (self.folder / name).lstat()
                 if not stat.S_ISREG(status.st_mode) or status.st_size != size or self._digest(name) != digest:
                     return None
-        except (OSError, ValueError, TypeError, AttributeError):
+        except (OSError, ValueError, TypeError, AttributeError, RecursionError):
             return None
         return set(files)
 
@@ -118,8 +121,8 @@ class KernelCache:
     def _files(self) -> Iterator[str]:
         """Yield the relative names of all files of PoCL's that it reads."""
         for folder, folders, files in os.walk(self.folder):
-            if Path(folder) == self.folder:
-                folders.remove(_RECORDS) if _RECORDS in folders else None
+            if Path(folder) == self.folder and _RECORDS in folders:
+                folders.remove(_RECORDS)
             # a link to a folder is listed as a folder, and not followed
             links = [name for name in folders if (Path(folder) / name).is_symlink()]
             for name in (*files, *links):
@@ -132,7 +135,7 @@ class KernelCache:
         for record in (self.folder / _RECORDS).glob("*"):
             files = self._vouched(record)
             if files is None:
-                record.unlink(missing_ok=True)
+                shutil.rmtree(record) if record.is_dir() else record.unlink(missing_ok=True)
             else:
                 known |= files
         for name in [name for name in self._files() if name not in known]:

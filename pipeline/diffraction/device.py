@@ -10,7 +10,7 @@ def require_device() -> None:
         device.default_device()
     except OSError as error:
         raise StorageError(
-            f"{error.filename}: no space left for compiled kernels; free some, or set XDG_CACHE_HOME to another folder"
+            f"{error.filename}: no space left for compiled kernels; free some, or set XDG_CACHE_HOME to another place"
         ) from None
     except device.NoDeviceError as error:
         raise DeviceError(str(error)) from None

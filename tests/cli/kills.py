@@ -20,7 +20,7 @@ from pathlib import Path
 
 from tests.cli.tool import SMALL, Tool, temporary_files, toml
 
-# seconds that a signal may take: those of the sweep's machine, which does other work meanwhile, are more
+# seconds from a signal to the end of the run
 ENDS_WITHIN_S = 2.0
 LINES = {
     signal.SIGINT: "interrupted; finished stages are kept",
@@ -61,6 +61,8 @@ def signalled(tool: Tool, config: Path, sent: signal.Signals, after_s: float, ca
             return
     took, code = time.monotonic() - sent_at, process.returncode
     counts.slowest_s = max(counts.slowest_s, took)
+    if took > ENDS_WITHIN_S and code != 0:
+        counts.faults.append(f"{sent.name} after {after_s:.3f} s: {took:.1f} s until its end")
     lines = stderr.splitlines()
     if code == 0:
         counts.ended["had finished"] += 1

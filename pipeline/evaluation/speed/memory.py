@@ -30,14 +30,9 @@ def peak_bytes(field: HeightField, config: Config, layout: PolarLayout) -> int:
     with scratch.temporary() as folder:
         heights = folder / "heights.npy"
         np.save(heights, field.heights_um)
-        command = [
-            sys.executable,
-            "-P",
-            "-m",
-            "pipeline.evaluation.speed.memory",
-            str(heights),
-            *map(str, field.pitch_um),
-        ]
+        # -P: nothing is imported from the working folder
+        module = [sys.executable, "-P", "-m", "pipeline.evaluation.speed.memory"]
+        command = [*module, str(heights), *map(str, field.pitch_um)]
         models = [model.model_dump_json() for model in (config, layout)]
         finished = subprocess.run([*command, *models], capture_output=True, text=True, check=True)
     return int(finished.stdout)
