@@ -55,7 +55,8 @@ def cli() -> None:
       diffract-bake run configs/elaphe.toml   or a synthetic snake skin
 
     Results go to stdout, progress to stderr. Exit codes: 0 done, 1 internal fault, 2 usage or config, 3 input file,
-    4 accuracy out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted.
+    4 accuracy out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted,
+    143 terminated.
     """
 
 

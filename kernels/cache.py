@@ -27,8 +27,8 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 _RECORDS = "compiled"
 # PoCL writes these at every use, and reads none of them
 _UNCHECKED = ("lock", "last_accessed")
-# compiling one program writes at most 0.4 MiB; loading one writes its source and its preprocessed source
-_ROOM_BYTES = 2**20
+# free space for a program: its source and preprocessed source to load it, its objects as well to compile it
+_ROOM_TO_LOAD, _ROOM_TO_COMPILE = 2**20, 2**22
 
 
 class KernelCache:
@@ -75,11 +75,12 @@ class KernelCache:
         """
         record = self.folder / _RECORDS / hashlib.sha256(identity.encode()).hexdigest()
         with FileLock(self.folder / "lock"):
-            self._require_room()
             if self._vouched(record) is not None:
+                self._require_room(_ROOM_TO_LOAD)
                 yield
                 return
             self._remove_unknown()
+            self._require_room(_ROOM_TO_COMPILE)
             known = set(self._files())
             for announce in self._listeners:
                 announce()
@@ -87,13 +88,13 @@ class KernelCache:
             with suppress(OSError):  # without its record, the next process compiles it once more
                 self._write(record, [name for name in self._files() if name not in known])
 
-    def _require_room(self) -> None:
-        """Raise OSError (ENOSPC) where the disk has no room for one more program."""
+    def _require_room(self, size: int) -> None:
+        """Raise OSError (ENOSPC) where the disk has less free space, bytes."""
         place = self.folder / "room"
         try:
             descriptor = os.open(place, os.O_WRONLY | os.O_CREAT, 0o600)
             try:
-                os.posix_fallocate(descriptor, 0, _ROOM_BYTES)
+                os.posix_fallocate(descriptor, 0, size)
             finally:
                 os.close(descriptor)
                 place.unlink()

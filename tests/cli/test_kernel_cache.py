@@ -2,16 +2,15 @@
 
 import os
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
 from tests.cli.tool import Tool, flip_a_byte, mounted
 
 
-@pytest.mark.parametrize("size", ["8k", "300k", "1200k"])
+@pytest.mark.parametrize("size", ["300k", "4200k"])
 def test_a_full_disk_is_one_line(tool: Tool, size: str) -> None:
+    """There is no room for the first kernel, or for the fourth."""
     disk = tool.folder / "disk"
     with mounted(disk, f"size={size}") as done:
         if not done:
@@ -22,13 +21,8 @@ def test_a_full_disk_is_one_line(tool: Tool, size: str) -> None:
     assert f"{disk}/diffract-bake/kernels: no space left" in result.stderr.splitlines()[-1]
 
 
-def cut(file: Path) -> None:
-    os.truncate(file, 0)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", [cut, flip_a_byte])
-def test_damaged_kernels_are_compiled_again(tool: Tool, damage: Callable[[Path], None]) -> None:
+def test_damaged_kernels_are_compiled_again(tool: Tool) -> None:
     environment, config = {"XDG_CACHE_HOME": str(tool.folder / "caches")}, tool.config()
 
     def compiles() -> bool:
@@ -43,8 +37,11 @@ def test_damaged_kernels_are_compiled_again(tool: Tool, damage: Callable[[Path],
     assert compiles()
     expected = made()
     assert expected
-    for file in (tool.folder / "caches").rglob("*.so"):
-        damage(file)
+    for i, file in enumerate((tool.folder / "caches").rglob("*.so")):
+        if i % 2:
+            os.truncate(file, 0)
+        else:
+            flip_a_byte(file)
     assert compiles()
     assert made() == expected
     assert not compiles()

@@ -127,9 +127,9 @@ def test_two_runs_at_once_share_the_work(baked: Tool, tool: Tool, outs: tuple[st
 
 def test_a_few_of_the_kills_of_make_kills(tmp_path: Path) -> None:
     counts = kills.Counts()
-    kills.sweep(tmp_path, kills=4, seed=5, longest_s=3.0, counts=counts)
+    kills.sweep(tmp_path, kills=2, seed=5, longest_s=3.0, counts=counts)
     for sent in (signal.SIGINT, signal.SIGTERM):
-        kills.interrupts(tmp_path, 6, sent, 1.2, counts)
+        kills.interrupts(tmp_path, 4, sent, 1.2, counts)
     assert counts.faults == []
 
 
