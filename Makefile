@@ -4,10 +4,11 @@
 PYTHON ?= python3
 VENV := .venv
 BAKE := $(VENV)/bin/diffract-bake
+INSTALL := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
+.PHONY: help setup lock bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -21,6 +22,8 @@ help:
 	@echo "make format                  fix and format the code with ruff"
 	@echo "make coverage                lines and branches that the fast tests run"
 	@echo "make profile CONFIG=...      where a warm bake of a config spends its time"
+	@echo "make lock                    pin the packages of setup again, with the digests of their files"
+	@echo "make kills                   kill 300 runs and interrupt 200 at random moments: the next run is unharmed"
 	@echo "make setup                   set up, and do nothing else"
 	@echo "make clean                   remove the environment and $(OUT)"
 
@@ -30,9 +33,17 @@ $(VENV)/ready: pyproject.toml requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "error: Python 3.11 or newer is needed; name one with make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
-		--constraint requirements.lock --editable '.[readers,bench,dev]'
+	$(INSTALL) --require-hashes --only-binary :all: --requirement requirements.lock
+	$(INSTALL) --no-deps --no-build-isolation --editable .
 	touch $@
+
+# pins every package that setup installs, for all Pythons from 3.11 on, with the digests of its files. Versions stay
+# where they still fit; make lock RENEW=--upgrade takes the newest. The tool itself lives in an environment of its own.
+lock: $(VENV)/ready
+	$(PYTHON) -m venv $(VENV)/locking
+	$(VENV)/locking/bin/python -m pip install --quiet --disable-pip-version-check uv==0.13.9
+	$(VENV)/locking/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
+		--no-annotate --all-extras $(RENEW) --output-file requirements.lock pyproject.toml
 
 # A device works when a kernel compiles and runs on it; `doctor` exits with 5 where none does. No driver is installed
 # where DIFFRACT_BAKE_DEVICE is set, because the fault may be its value, which doctor reports.
@@ -95,6 +106,13 @@ test: setup glslang lint
 
 test-fast: setup glslang
 	$(VENV)/bin/python -m pytest -m "not slow"
+
+# half an hour on two cores; tests/cli/test_killing.py does a few of each
+KILLS ?= 300
+INTERRUPTS ?= 200
+.PHONY: kills
+kills: setup
+	$(VENV)/bin/python -m tests.cli.kills --kills $(KILLS) --interrupts $(INTERRUPTS) --seed $(or $(SEED),1)
 
 # PoCL builds for a processor without AVX-512 on one that has it, into a kernel cache of its own. Debian's build of PoCL
 # listens to the first variable, others to the second.

@@ -56,7 +56,7 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
     # everything is baked and written, but a missed error budget is a failure
     missed = [line for _, line in baked if line is not None]
     if missed:
-        raise AccuracyError("\n".join(missed))
+        raise AccuracyError(*missed)
 
 
 def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_json: bool) -> None:
@@ -78,7 +78,7 @@ def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_
     for result in results:
         found = [stage["summary"].get("certificate") for stage in result["stages"].values()]
         for certificate in [certificate for certificate in found if certificate is not None][-1:]:
-            click.echo(f"{result['name']}: {_certified(certificate)}")
+            console.say(f"{result['name']}: {_certified(certificate)}")
 
 
 def _certified(certificate: dict[str, Any]) -> str:
@@ -127,11 +127,11 @@ def _bake(config: "Config", out: Path, store_root: Path | None, until: str) -> t
 def _print_result(result: dict[str, Any]) -> None:
     from pipeline.stages.validation_report import ERROR_COLUMNS, error_rows
 
-    click.echo(f"{result['name']}: CIELAB error of the bundle's tables against the exact sum")
+    console.say(f"{result['name']}: CIELAB error of the bundle's tables against the exact sum")
     console.print_table(ERROR_COLUMNS, error_rows(result["stages"]["validate"]["summary"]))
     for path in (*result["files"], result["bundle"]):
         if path is not None:
-            click.echo(path)
+            console.say(path)
 
 
 @click.command("plan")
@@ -146,11 +146,11 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
         console.print_json(plans)
         return
     for name, steps in plans.items():
-        click.echo(f"{name}:")
+        console.say(f"{name}:")
         console.print_table(["stage", "state", "cost"], [[s["stage"], s["state"], s["cost"]] for s in steps])
         for step in steps:
             if step["state"] == "to do":
-                click.echo(f"{step['stage']}: {step['reason']}")
+                console.say(f"{step['stage']}: {step['reason']}")
 
 
 def _plan(config: "Config", store: Any) -> list[dict[str, str]]:

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     Results = SpeedResults | StabilityResults | FigureResults
 
-_PROCESS = "from cli.main import process; process()"
+# starts the tool in a process of its own; -P: nothing is imported from the working folder
+COMMAND_LINE = (sys.executable, "-P", "-c", "from cli.entry import process; process()")
 
 
 def _out_option(default: str, files: str) -> Callable[..., Any]:
@@ -54,7 +55,7 @@ def speed_command(
     from pipeline.store import scratch
 
     scratch.require_folder(out)
-    command_line = CommandLine((sys.executable, "-c", _PROCESS))
+    command_line = CommandLine(COMMAND_LINE)
     with nullcontext(config_paths) if config_paths else bench.built_in() as paths:
         configs = [(sources.load(path), path) for path in paths]
         with console.showing_progress() as progress:
@@ -62,7 +63,8 @@ def speed_command(
             found = bench.run(configs, quick, store, command_line, progress, console.note)
     if written := _write(found, out, as_json):
         _print_speed(found)
-        click.echo("\n".join(written))
+        for path in written:
+            console.say(path)
 
 
 @bench_command.command("stability")
@@ -85,9 +87,10 @@ def stability_command(quick: bool, out: Path, as_json: bool) -> None:
         found = bench.run(quick, progress)
     if written := _write(found, out, as_json):
         _print_stability(found)
-        click.echo("\n".join(written))
+        for path in written:
+            console.say(path)
     if found.faults:
-        raise AccuracyError("\n".join(found.faults))
+        raise AccuracyError(*found.faults)
 
 
 @bench_command.command("figures")
@@ -117,7 +120,7 @@ def figures_command(
         found = bench.run(configs, quick, console.open_store(store_root), progress, console.note)
     if _write(found, out, as_json):
         _print_figures(found)
-        click.echo(str(out / "index.html"))
+        console.say(str(out / "index.html"))
 
 
 def _write(found: "Results", out: Path, as_json: bool) -> list[str]:
@@ -157,14 +160,14 @@ def _ms(seconds: float) -> str:
 def _print_speed(found: "SpeedResults") -> None:
     """The device, every table, the stages' shares, and the criteria."""
     machine = found.machine
-    click.echo(
+    console.say(
         f"{machine.device}, {machine.compute_units} compute units: {machine.single_flops / 1e9:.0f} GFLOP/s single, "
         f"{machine.double_flops / 1e9:.0f} double, {machine.bandwidth / 1e9:.1f} GB/s, measured in this run"
     )
     for surface in found.surfaces:
         _print_surface(surface, found)
     if found.constants:
-        click.echo("")
+        console.say("")
         _print_rows(
             found.constants,
             {
@@ -176,7 +179,8 @@ def _print_speed(found: "SpeedResults") -> None:
                 "gain": lambda constant: f"{100.0 * (1.0 - constant.seconds / constant.other_s):.0f} %",
             },
         )
-    click.echo("\nCriteria")
+    console.say("")
+    console.say("Criteria")
     _print_checks(found.checks)
 
 
@@ -184,8 +188,9 @@ def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:
     from pipeline.evaluation.speed.machine import share
 
     ny, nx = surface.samples
-    click.echo(
-        f"\n{surface.name}: {nx} x {ny} samples, sigma {surface.sigma_um:g} um, {surface.terms} terms; "
+    console.say("")
+    console.say(
+        f"{surface.name}: {nx} x {ny} samples, sigma {surface.sigma_um:g} um, {surface.terms} terms; "
         f"errors over a map of {surface.map_size} x {surface.map_size}"
     )
     _print_rows(
@@ -200,7 +205,7 @@ def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:
             "max": lambda point: f"{point.error.maximum:.3g}",
         },
     )
-    click.echo("")
+    console.say("")
     _print_rows(
         [share(timed, found.machine) for timed in surface.timed],
         {
@@ -211,7 +216,7 @@ def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:
             "bound by": lambda reached: reached.bound,
         },
     )
-    click.echo("")
+    console.say("")
     # the ratio to the kernel's time, and the largest difference from the kernel's coefficients
     _print_rows(
         surface.transforms,
@@ -226,17 +231,17 @@ def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:
     )
     for name, agreement in (("FINUFFT", surface.agreement.nufft), ("plain numpy", surface.agreement.numpy)):
         if agreement is not None:
-            click.echo(
+            console.say(
                 f"{name} and the kernels, on the polar table's samples: median difference {agreement.median:.1e}, "
                 f"99th percentile {agreement.percentile_99:.1e}"
             )
     if surface.nufft_upsampling is not None:
-        click.echo(
+        console.say(
             "FINUFFT: type 2 on the low-passed patch under the window, 1e-5, single, upsampling "
             f"{surface.nufft_upsampling:g}; FFTs count once, the rest is scaled by points"
         )
     for text in surface.notes:
-        click.echo(f"note: {text}")
+        console.say(f"note: {text}")
 
 
 def _grid(point: "Point") -> str:
@@ -258,8 +263,8 @@ def _print_stability(found: "StabilityResults") -> None:
         rows.append([family, *(str(counts[verdict]) for verdict in ("holds", "refused", "misses")), worst])
     console.print_table(["family", "holds", "refused", "misses", "worst error, of its tolerance"], rows)
     for check in found.checks:
-        click.echo(f"{check.what}: {check.measured}, expected {check.expected}: {check.verdict}")
-    click.echo("(worst error of |P|^2 over the larger of it and a thousandth of its mean)")
+        console.say(f"{check.what}: {check.measured}, expected {check.expected}: {check.verdict}")
+    console.say("(worst error of |P|^2 over the larger of it and a thousandth of its mean)")
 
 
 def _print_figures(found: "FigureResults") -> None:
@@ -273,4 +278,4 @@ def _print_figures(found: "FigureResults") -> None:
     for each in found.made:
         for check in each.page.checks:
             if check.verdict == "misses":
-                click.echo(f"{each.page.name}: {check.what}: expected {check.expected}, measured {check.measured}")
+                console.say(f"{each.page.name}: {check.what}: expected {check.expected}, measured {check.measured}")

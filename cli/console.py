@@ -2,13 +2,14 @@
 
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -16,6 +17,29 @@ from pipeline.progress import Progress
 
 # steps that last longer get a line
 _REPORTED_AFTER_S = 1.0
+
+# the process's own stderr, where `keep_stderr` has taken its place; None: sys.stderr
+_messages: TextIO | None = None
+
+
+def keep_stderr(foreign: int) -> None:
+    """Keeps stderr for this module's lines: what libraries write there goes to the file descriptor `foreign`.
+
+    Compilers and readers of images write to the descriptor, Python's warnings and loggers to sys.stderr.
+    """
+    global _messages
+    if sys.stderr is not None:
+        own = os.dup(sys.stderr.fileno())
+        _messages = os.fdopen(own, "w", buffering=1, encoding=sys.stderr.encoding, errors="backslashreplace")
+    os.dup2(foreign, 2)
+
+
+def escaped(text: str) -> str:
+    """Replaces what a terminal does not print as one character of a line: control and formatting characters.
+
+    Names of files and messages of libraries hold whatever their authors put there.
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 def store_option(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -79,20 +103,31 @@ def print_json(value: Any) -> None:
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Prints left-aligned columns to stdout, with their names as the first row."""
-    widths = [max(len(str(cell)) for cell in column) for column in zip(columns, *rows, strict=True)]
-    for row in (columns, *rows):
-        cells = [str(cell).ljust(width) for cell, width in zip(row, widths, strict=True)]
-        click.echo("  ".join(cells).rstrip())
+    table = [[escaped(str(cell)) for cell in row] for row in (columns, *rows)]
+    widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
+    for row in table:
+        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+        say("  ".join(cells).rstrip())
+
+
+def say(text: str) -> None:
+    """Prints one line of a result to stdout."""
+    click.echo(escaped(text))
 
 
 def warn(text: str) -> None:
-    """Prints a warning to stderr."""
-    click.echo(f"warning: {text}", err=True)
+    """Prints a warning to stderr, as one line."""
+    note(f"warning: {text}")
 
 
 def note(text: str) -> None:
-    """Prints a line of progress to stderr."""
-    click.echo(text, err=True)
+    """Prints one line to stderr: progress, or a message."""
+    click.echo(escaped(text), file=_messages, err=True)
+
+
+def usage_error(error: click.ClickException) -> None:
+    """Prints a fault of the command line to stderr: usage, and the message as one line."""
+    click.UsageError(escaped(error.format_message()), getattr(error, "ctx", None)).show(_messages)
 
 
 def warning_reporter(config: Any, store: Any) -> Callable[[Any, float | None], None]:
@@ -125,7 +160,8 @@ def showing_progress() -> Iterator[Progress]:
     # functools' cache prints the line once, even if many kernels are compiled
     with kernel_cache().announcing(cache(lambda: note("  compiling kernels for this processor, once ..."))):
         # stderr is None where the process has none (2>&-)
-        if sys.stderr is not None and sys.stderr.isatty():
+        stream = _messages or sys.stderr
+        if stream is not None and stream.isatty():
             with _bar() as progress:
                 yield progress
         else:
@@ -152,16 +188,17 @@ class _Lines:
 @contextmanager
 def _bar() -> Iterator[Progress]:
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import BarColumn, TaskID, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
     columns = (TextColumn("  {task.description:<14}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-    with Bars(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bars:
+    with Bars(*columns, TimeRemainingColumn(), console=Console(file=_messages, stderr=True), transient=True) as bars:
         tasks: dict[str, TaskID] = {}
 
         def progress(step: str, done: float) -> None:
             if step not in tasks:
-                tasks[step] = bars.add_task(step, total=1.0)
+                tasks[step] = bars.add_task(escape(escaped(step)), total=1.0)
             # a completed bar disappears at once, before the next line of text
             bars.update(tasks[step], completed=done, visible=done < 1.0, refresh=done >= 1.0)
 

@@ -29,4 +29,4 @@ def doctor_command(as_json: bool) -> None:
     require_device()
     used = device.default_device()
     if not as_json:
-        click.echo(f"in use: {used.name}")
+        console.say(f"in use: {used.name}")

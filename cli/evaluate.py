@@ -51,9 +51,9 @@ def eval_command(
     if as_json:
         console.print_json([dict(zip(columns, map(float, row), strict=True)) for row in values])
         return
-    click.echo(",".join(columns))
+    console.say(",".join(columns))
     for row in values:
-        click.echo(",".join(f"{value:.12g}" for value in row))
+        console.say(",".join(f"{value:.12g}" for value in row))
 
 
 def _read_wavelengths(text: str) -> list[float]:

@@ -50,7 +50,7 @@ def inspect_command(
         console.print_json(found)
         return
     for key, value in found.items():
-        click.echo(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
+        console.say(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
 
 
 def _print_formats(as_json: bool) -> None:
@@ -60,7 +60,7 @@ def _print_formats(as_json: bool) -> None:
         console.print_json([asdict(entry) for entry in READ])
         return
     for entry in READ:
-        click.echo(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}")
+        console.say(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}")
 
 
 def _schema(document: str) -> dict[str, Any]:

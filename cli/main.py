@@ -1,12 +1,13 @@
 """The `diffract-bake` command: finds subcommands, and turns errors into one line and an exit code."""
 
-import contextlib
 import errno
 import importlib
 import os
 import sys
 
 import click
+
+from cli import console
 
 # command -> module: modules are imported when their command is used, because --help must start fast
 _COMMANDS = {
@@ -54,26 +55,9 @@ def cli() -> None:
       diffract-bake run configs/elaphe.toml   or a synthetic snake skin
 
     Results go to stdout, progress to stderr. Exit codes: 0 done, 1 internal fault, 2 usage or config, 3 input file,
-    4 accuracy out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted.
+    4 accuracy out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted,
+    143 terminated.
     """
-
-
-def process() -> None:
-    """Runs `main` and ends the process without the interpreter's cleanup: the entry point.
-
-    The cleanup of hundreds of MB takes a fifth of a second, and nothing depends on it: files are closed and locks
-    released where they are used.
-    """
-    code: str | int | None = 0
-    try:
-        main()
-    except SystemExit as done:
-        code = done.code
-    with contextlib.suppress(OSError):
-        sys.stdout.flush()
-        sys.stderr.flush()
-    # as sys.exit does: None is 0, and a text is a failure
-    os._exit(code if isinstance(code, int) else int(code is not None))
 
 
 def main() -> None:
@@ -89,14 +73,11 @@ def main() -> None:
     except click.exceptions.Exit as done:
         sys.exit(done.exit_code)
     except click.ClickException as error:
-        error.show()
+        console.usage_error(error)
         sys.exit(2)
-    except (click.Abort, KeyboardInterrupt, EOFError):
-        click.echo("interrupted; finished stages are kept", err=True)
-        sys.exit(130)
     except BakeError as error:
-        for line in str(error).splitlines():
-            click.echo(f"error: {line}", err=True)
+        for line in error.lines:
+            console.note(f"error: {line}")
         sys.exit(error.exit_code)
     except OSError as error:
         sys.exit(_output_refused(error))
@@ -111,11 +92,14 @@ def _output_refused(error: OSError) -> int:
 
     if error.errno not in (errno.EPIPE, *FULL):
         return _internal_fault(error)
+    if error.filename is not None:
+        console.note(f"error: {error.filename}: no space left to write; free some, or choose another folder")
+        return StorageError.exit_code
     # otherwise the buffered rest would fail again at exit
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno == errno.EPIPE:
         return 0
-    click.echo("error: stdout: no space left to write", err=True)
+    console.note("error: stdout: no space left to write")
     return StorageError.exit_code
 
 
@@ -123,7 +107,5 @@ def _internal_fault(error: Exception) -> int:
     if os.environ.get("DIFFRACT_BAKE_DEBUG"):
         raise error
     text = " ".join(f"{type(error).__name__}: {error}".split())
-    click.echo(
-        f"error: internal fault, please report it: {text} (DIFFRACT_BAKE_DEBUG=1 shows the whole traceback)", err=True
-    )
+    console.note(f"error: internal fault, please report it: {text} (DIFFRACT_BAKE_DEBUG=1 shows the whole traceback)")
     return 1

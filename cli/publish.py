@@ -29,7 +29,7 @@ def publish_command(config_path: Path, out: Path, store_root: Path | None, as_js
     if as_json:
         console.print_json({"bundle": str(placed)})
     else:
-        click.echo(str(placed))
+        console.say(str(placed))
 
 
 @click.command("verify")
@@ -44,6 +44,6 @@ def verify_command(bundle: Path, as_json: bool) -> None:
     if as_json:
         console.print_json({"bundle": str(bundle), "faults": faults})
     if faults:
-        raise DamagedError("\n".join(f"{bundle}: {fault}" for fault in faults))
+        raise DamagedError(*(f"{bundle}: {fault}" for fault in faults))
     if not as_json:
-        click.echo(f"{bundle}: unchanged")
+        console.say(f"{bundle}: unchanged")

@@ -63,4 +63,5 @@ def render_command(
     if as_json:
         console.print_json({"files": made})
     else:
-        click.echo("\n".join(made))
+        for path in made:
+            console.say(path)

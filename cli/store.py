@@ -26,7 +26,7 @@ def list_command(store_root: Path | None, as_json: bool) -> None:
         return
     rows = [[f["stage"], f["name"], f"{f['bytes'] / _MIB:.1f}", f["key"][:12]] for f in found]
     console.print_table(["stage", "name", "MiB", "key"], rows)
-    click.echo(f"{len(found)} artifacts, {sum(f['bytes'] for f in found) / _MIB:.0f} MiB in {store.root}")
+    console.say(f"{len(found)} artifacts, {sum(f['bytes'] for f in found) / _MIB:.0f} MiB in {store.root}")
 
 
 @store_command.command("check")
@@ -41,9 +41,9 @@ def check_command(store_root: Path | None, as_json: bool) -> None:
     if as_json:
         console.print_json({"root": str(store.root), "faults": faults})
     if faults:
-        raise DamagedError("\n".join(faults))
+        raise DamagedError(*faults)
     if not as_json:
-        click.echo(f"{len(store.artifacts())} artifacts in {store.root}: unchanged")
+        console.say(f"{len(store.artifacts())} artifacts in {store.root}: unchanged")
 
 
 @store_command.command("collect")
@@ -61,4 +61,4 @@ def collect_command(unused_days: float | None, store_root: Path | None, as_json:
     if as_json:
         console.print_json({"root": str(store.root), "removed": removed, "bytes": freed})
     else:
-        click.echo(f"removed {removed} folders, {freed / _MIB:.0f} MiB, from {store.root}")
+        console.say(f"removed {removed} folders, {freed / _MIB:.0f} MiB, from {store.root}")

@@ -6,6 +6,7 @@ cannot compile for it. Contexts do not survive a fork, so they are made lazily, 
 
 import os
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,6 +26,9 @@ _INSTALL = (
     "install a working OpenCL driver: on Debian or Ubuntu `apt-get install pocl-opencl-icd` as root, with conda "
     "`conda install -c conda-forge pocl`; then `diffract-bake doctor` shows what was found"
 )
+
+# PoCL compiles a kernel a second time for grids of as many work-items along an axis
+_WIDE_GRID = 2**16 - 1
 
 # -w: without AVX-512, PoCL's compiler warns of every vector argument that its ABI differs; errors still come through
 _OPTIONS = ["-cl-mad-enable", "-w"]
@@ -71,8 +75,8 @@ class Probe:
 @cache
 def _opencl() -> Any:
     """pyopencl, imported once its compilers' caches have a place."""
-    os.environ.setdefault("POCL_CACHE_DIR", str(kernel_cache().folder))
-    # PoCL has its own cache on disk; pyopencl's second one only adds files
+    # PoCL has a cache on disk, whose files are checked there alone; pyopencl's second one only adds files
+    os.environ["POCL_CACHE_DIR"] = str(kernel_cache().folder)
     os.environ.setdefault("PYOPENCL_NO_CACHE", "1")
     import pyopencl
 
@@ -94,6 +98,13 @@ def _listed() -> list[tuple[Any, Any]]:
     return [(platform, device) for platform in platforms for device in platform.get_devices()]
 
 
+def _built(context: Any, text: str, options: list[str]) -> Any:
+    """The program of a source; the compiler's errors are raised, and its remarks are of no use to anybody."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return _opencl().Program(context, text).build(options)
+
+
 def _probe(platform: Any, device: Any) -> Probe:
     cl = _opencl()
     name, driver = device.name.strip(), f"{device.driver_version}, {device.version.strip()}"
@@ -103,7 +114,7 @@ def _probe(platform: Any, device: Any) -> Probe:
         with kernel_cache().compiling(f"{driver} {name} {_PROBE}"):
             queue = cl.CommandQueue(context)
             buffer = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, out.nbytes)
-            cl.Program(context, _PROBE).build(_OPTIONS).probe(queue, (4,), None, buffer)
+            _built(context, _PROBE, _OPTIONS).probe(queue, (4,), None, buffer)
             cl.enqueue_copy(queue, out, buffer)
         if not np.array_equal(out - out[0], [0.0, 2.0, 4.0, 6.0]):
             fault = f"a test kernel gave {out.tolist()} instead of steps of 2"
@@ -225,24 +236,24 @@ class Program:
     """OpenCL sources built with constants, their kernels ready to launch on the default device."""
 
     def __init__(self, sources: Sequence[str], constants: Mapping[str, int | str]) -> None:
-        cl = _opencl()
         self.device = default_device()
         text = source.text(*sources)
         options = [*_OPTIONS, *(f"-D{key}={value}" for key, value in sorted(constants.items()))]
         self._identity = f"{self.device.driver} {self.device.name} {self.device.vector_width} {options} {text}"
         with kernel_cache().compiling(self._identity):
-            self._program = cl.Program(self.device.context, text).build(options)
-        self._kernels: dict[str, Any] = {}
+            self._program = _built(self.device.context, text, options)
+        self._kernels: dict[tuple[str, bool], Any] = {}
 
     def launch(self, kernel: str, size: tuple[int, ...], *arguments: Any) -> None:
         """Run one kernel over `size` work-items and wait, so that buffers may go afterwards."""
-        if kernel in self._kernels:
-            self.device.run(self._kernels[kernel], size, arguments)
+        variant = kernel, max(size) < _WIDE_GRID
+        if variant in self._kernels:
+            self.device.run(self._kernels[variant], size, arguments)
             return
-        self._kernels[kernel] = getattr(self._program, kernel)
+        self._kernels[variant] = getattr(self._program, kernel)
         # PoCL finishes compiling at the first launch
-        with kernel_cache().compiling(f"{kernel} {self._identity}"):
-            self.device.run(self._kernels[kernel], size, arguments)
+        with kernel_cache().compiling(f"{variant} {self._identity}"):
+            self.device.run(self._kernels[variant], size, arguments)
 
 
 def upload(array: np.ndarray) -> Any:

@@ -6,9 +6,16 @@ class carries the exit code that docs/usage.md documents.
 
 
 class BakeError(Exception):
-    """Base of faults that the user can correct; the command line shows them without a traceback."""
+    """Base of faults that the user can correct; the command line shows them without a traceback.
+
+    message: one line. others: those of further faults of the same kind.
+    """
 
     exit_code = 1
+
+    def __init__(self, message: str, *others: str) -> None:
+        self.lines = (message, *others)
+        super().__init__("\n".join(self.lines))
 
 
 class ConfigError(BakeError):
@@ -23,7 +30,7 @@ class ConfigError(BakeError):
         self.source = source
         self.faults = faults
         lines = [f"{source}: {key}: {text}" if key else f"{source}: {text}" for key, text in faults]
-        super().__init__("\n".join(lines))
+        super().__init__(*lines)
 
 
 class InputError(BakeError):

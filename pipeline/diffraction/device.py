@@ -1,12 +1,16 @@
 """The check that a device works, whose failure is one of the project's errors."""
 
 from kernels import device
-from pipeline.errors import DeviceError
+from pipeline.errors import DeviceError, StorageError
 
 
 def require_device() -> None:
-    """Raises DeviceError if no device works; its message names the attempts and the remedy."""
+    """Raises DeviceError if no device works, with the attempts and the remedy; StorageError if its disk is full."""
     try:
         device.default_device()
+    except OSError as error:
+        raise StorageError(
+            f"{error.filename}: no space left for compiled kernels; free some, or set XDG_CACHE_HOME to another place"
+        ) from None
     except device.NoDeviceError as error:
         raise DeviceError(str(error)) from None

@@ -2,9 +2,9 @@
 
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
+from threading import Thread
 from typing import Any
 
 from pipeline import layouts
@@ -110,10 +110,10 @@ def execute(
     keys = {step.stage.name: step.key for step in steps}
     if any(step.stage.uses_device and not step.cached for step in steps):
         # a missing device is reported before any work; its driver loads while zarr is imported, which takes as long
-        with ThreadPoolExecutor(1) as pool:
-            answer = pool.submit(require_device)
-            import_module("zarr")
-            answer.result()
+        found = _Device()
+        found.start()
+        import_module("zarr")
+        found.result()
     opened: dict[str, Artifact] = {}
     session = Session()
     for step in steps:
@@ -135,6 +135,26 @@ def execute(
         if on_step is not None:
             on_step(step, seconds)
     return {name: store.describe(name, key) for name, key in keys.items()}
+
+
+class _Device(Thread):
+    """Looks for a device. No program waits for it to end: an interrupted import may keep it waiting for ever."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self._fault: Exception | None = None
+
+    def run(self) -> None:
+        try:
+            require_device()
+        except Exception as error:
+            self._fault = error
+
+    def result(self) -> None:
+        """Waits for the search and raises its error."""
+        self.join()
+        if self._fault is not None:
+            raise self._fault
 
 
 def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress) -> None:

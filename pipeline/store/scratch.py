@@ -4,6 +4,7 @@ import contextlib
 import os
 import platform
 import shutil
+import tempfile
 import time
 import uuid
 from collections.abc import Iterator
@@ -12,7 +13,23 @@ from pathlib import Path
 from pipeline.errors import StorageError
 
 _REPLACING = ".writing-"
+# a file descriptor that receives the path of every folder that is made
+_announced: int | None = None
 _FOREIGN_ABANDONED_AFTER_S = 24 * 3600.0
+
+
+def announce_to(descriptor: int) -> None:
+    """Writes the path of every folder that this process makes to a file descriptor, followed by a zero byte.
+
+    Whoever ends the process learns from it which folders to remove.
+    """
+    global _announced
+    _announced = descriptor
+
+
+def _announce(folder: Path) -> None:
+    if _announced is not None:
+        os.write(_announced, os.fsencode(folder.absolute()) + b"\0")
 
 
 def make(parent: Path, prefix: str = "") -> Path:
@@ -21,8 +38,19 @@ def make(parent: Path, prefix: str = "") -> Path:
     Its permissions follow the umask. mkdtemp's would hide the results from other users.
     """
     folder = parent / f"{prefix}{os.getpid()}@{platform.node()}-{uuid.uuid4().hex}"
+    _announce(folder)
     folder.mkdir(parents=True)
     return folder
+
+
+@contextlib.contextmanager
+def temporary() -> Iterator[Path]:
+    """Yields a folder among the system's temporary files, and removes it afterwards."""
+    folder = make(Path(tempfile.gettempdir()), "diffract-bake-")
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def abandoned(folder: Path, prefix: str = "") -> bool:

@@ -249,7 +249,9 @@ def writing(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         if error.errno in FULL:
-            raise StorageError(f"{folder}: no space left to write; free some, or choose another folder") from None
+            # other folders are written meanwhile: compiled kernels have a cache of their own
+            full = folder if error.filename is None or _concerns(error, folder) else os.fsdecode(error.filename)
+            raise StorageError(f"{full}: no space left to write; free some, or choose another folder") from None
         if error.errno in _REFUSALS and _concerns(error, folder):
             reason = os.strerror(error.errno)
             raise StorageError(f"{folder}: cannot be written ({reason}); choose another folder") from None

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli import kills
 from tests.cli.tool import Tool, temporary_files
 from tests.support import killed_at
 
@@ -14,18 +15,20 @@ STAGES = ["surface", "stack", "table", "textures", "render", "validate"]
 
 pytestmark = pytest.mark.slow
 
-# a real interrupt, as the keyboard's, once validation is at work and has a file in its folder
-INTERRUPTED = """
+# a signal once validation is at work and has a file in its folder
+SIGNALLED = """
 import os, signal
+from cli.entry import process
 from pipeline.stages import validate
 produce = validate._produce
 def interrupted(config, inputs, folder, progress):
     (folder / "half.txt").write_text("half")
     def tell(step, done):
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getppid(), signal.{name})
         progress(step, done)
     return produce(config, inputs, folder, tell)
 validate._produce = interrupted
+process()
 """
 
 
@@ -92,10 +95,11 @@ def assert_ends_as(undisturbed: Tool, tool: Tool) -> None:
     assert temporary_files(tool) == []
 
 
-def test_interrupted_by_the_keyboard(tool: Tool) -> None:
-    result = tool.process("run", tool.config(), wrapper=INTERRUPTED)
-    assert result.code == 130
-    assert result.stderr.splitlines()[-1] == "interrupted; finished stages are kept"
+@pytest.mark.parametrize(("name", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")])
+def test_signalled_at_work(tool: Tool, name: str, code: int, word: str) -> None:
+    result = tool.process("run", tool.config(), wrapper=SIGNALLED.format(name=name))
+    assert result.code == code
+    assert result.stderr.splitlines()[-1] == f"{word}; finished stages are kept"
     assert "Traceback" not in result.stderr
     assert list(tool.artifacts()) == ["render", "stack", "surface", "table"]
     assert temporary_files(tool) == []
@@ -119,6 +123,14 @@ def test_two_runs_at_once_share_the_work(baked: Tool, tool: Tool, outs: tuple[st
     for out in {*outs}:
         assert bundles(tool.folder / out) == [baked.bundle().name]
     assert tool("store", "check").code == 0
+
+
+def test_a_few_of_the_kills_of_make_kills(tmp_path: Path) -> None:
+    counts = kills.Counts()
+    kills.sweep(tmp_path, kills=2, seed=5, longest_s=3.0, counts=counts)
+    for sent in (signal.SIGINT, signal.SIGTERM):
+        kills.interrupts(tmp_path, 4, sent, 1.2, counts)
+    assert counts.faults == []
 
 
 def bundles(out: Path) -> list[str]:

@@ -23,7 +23,9 @@ METAL, DIELECTRIC = "aluminium", "n = 1.5"
 INDICES = {METAL: 1.37 + 7.62j, DIELECTRIC: 1.5 + 1e-6j}
 # u = lambda / period: where a blaze rising towards +x sends light that travels towards +x
 _ORDER = 1
-_THREADS = "OPENBLAS_NUM_THREADS"
+# of processes: one thread of BLAS each, because small matrices lose far more to threads than they gain; and no import
+# from the working folder
+_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PYTHONSAFEPATH": "1"}
 
 
 def cosine(x: Array) -> Array:
@@ -116,27 +118,25 @@ def solve(case: GratingCase, depths: Array) -> Efficiencies:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Processes started here have one thread of BLAS: small matrices lose far more to threads than they gain.
-
-    OpenBLAS reads the environment as it loads, so this process keeps its own.
-    """
-    before = os.environ.get(_THREADS)
-    os.environ[_THREADS] = "1"
+def _environment_of_processes() -> Iterator[None]:
+    """Processes started here have variables that this process, which has read its own, is not affected by."""
+    before = {name: os.environ.get(name) for name in _ENVIRONMENT}
+    os.environ.update(_ENVIRONMENT)
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[_THREADS]
-        else:
-            os.environ[_THREADS] = before
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def sweep(cases: Sequence[GratingCase], depths: Array, progress: Progress) -> dict[GratingCase, Efficiencies]:
     """Solve all cases in parallel processes, the longest first."""
     longest_first = sorted(cases, key=lambda case: -case.period)
     found = {}
-    with _one_thread_each(), ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+    with _environment_of_processes(), ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
         for done, result in enumerate(pool.map(solve, longest_first, [depths] * len(longest_first))):
             found[longest_first[done]] = result
             progress("coupled waves", (done + 1) / len(longest_first))

@@ -1,6 +1,5 @@
 """`bench speed`: all surfaces, kernels' constants, whole runs and criteria, and the files that hold them."""
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from pipeline.evaluation.stability import sweep, verdict
 from pipeline.progress import Progress
 from pipeline.stages import run as stages
 from pipeline.stages import surface
+from pipeline.store import scratch
 from pipeline.store.store import Store
 from pipeline.surface.heightfield import HeightField
 
@@ -69,9 +69,9 @@ class SpeedResults:
 @contextmanager
 def built_in() -> Iterator[tuple[Path, ...]]:
     """Give paths of configs of three synthetic surfaces for as long as they are needed."""
-    with tempfile.TemporaryDirectory() as folder:
+    with scratch.temporary() as folder:
         recipes = ((name, f'[surface]\nrecipe = {{ kind = "{name}" }}\n') for name in _BUILT_IN)
-        yield tuple(processes.write_config(Path(folder), name, text) for name, text in recipes)
+        yield tuple(processes.write_config(folder, name, text) for name, text in recipes)
 
 
 def run(

@@ -7,13 +7,13 @@ as JSON.
 import re
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.evaluation.speed import setting
+from pipeline.store import scratch
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Mirror
 from pipeline.surface.source import SurfaceSource
@@ -27,10 +27,12 @@ _SEED = 5
 
 def peak_bytes(field: HeightField, config: Config, layout: PolarLayout) -> int:
     """Return the peak memory, bytes, of a fresh process that makes stack, power spectrum and table of a surface."""
-    with tempfile.TemporaryDirectory() as folder:
-        heights = Path(folder) / "heights.npy"
+    with scratch.temporary() as folder:
+        heights = folder / "heights.npy"
         np.save(heights, field.heights_um)
-        command = [sys.executable, "-m", "pipeline.evaluation.speed.memory", str(heights), *map(str, field.pitch_um)]
+        # -P: nothing is imported from the working folder
+        module = [sys.executable, "-P", "-m", "pipeline.evaluation.speed.memory"]
+        command = [*module, str(heights), *map(str, field.pitch_um)]
         models = [model.model_dump_json() for model in (config, layout)]
         finished = subprocess.run([*command, *models], capture_output=True, text=True, check=True)
     return int(finished.stdout)

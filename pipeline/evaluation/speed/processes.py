@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.progress import Progress, silent
+from pipeline.store import scratch
 
 # a first config, and one of other terms, nodes in s, terms in |w| and window reach
 _FIRST = '[surface]\nrecipe = { kind = "blazed", period_um = 2.5, height_um = 0.25 }\n'
@@ -61,14 +62,12 @@ class CommandLine:
         cache: folder of caches, kernels included; None for the user's own. until: the last stage; None for all.
         Raises RunFailedError.
         """
-        with tempfile.TemporaryDirectory() as folder:
+        with scratch.temporary() as folder:
             command = [*self.words, "run", str(config), "--store", f"{folder}/store", "--out", f"{folder}/out"]
             command += [] if until is None else ["--until", until]
             environment = dict(os.environ)
             if cache is not None:
                 environment["XDG_CACHE_HOME"] = str(cache)
-                # this process has set it for PoCL
-                environment.pop("POCL_CACHE_DIR", None)
             with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
                 started = time.perf_counter()
                 process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment)
@@ -121,8 +120,8 @@ def measure_compiling(command_line: CommandLine, progress: Progress = silent) ->
 
     Raises RunFailedError.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        root, cache, done = Path(folder), Path(folder) / "cache", iter(range(1, 9))
+    with scratch.temporary() as folder:
+        root, cache, done = folder, folder / "cache", iter(range(1, 9))
         first, other = write_config(root, "first", _FIRST), write_config(root, "next", _NEXT)
 
         def cpu_s(path: Path) -> float:

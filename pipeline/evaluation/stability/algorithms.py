@@ -2,7 +2,6 @@
 
 from math import pi
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.special import jv
@@ -25,6 +24,7 @@ from pipeline.optics.light import Quadrature
 from pipeline.optics.material import Material
 from pipeline.optics.random_directions import random_pairs
 from pipeline.stages import run, surface
+from pipeline.store import scratch
 from pipeline.store.store import Store
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Mirror
@@ -145,10 +145,10 @@ def table_error(case: StressCase, field: HeightField) -> float:
 
     Raises AccuracyError where the plan or the certificate refuses.
     """
-    with TemporaryDirectory() as folder:
-        heights = Path(folder) / "heights.npy"
+    with scratch.temporary() as folder:
+        heights = folder / "heights.npy"
         np.save(heights, field.heights_um)
-        config, store = _config(case, heights), Store(Path(folder) / "store")
+        config, store = _config(case, heights), Store(folder / "store")
         made = run.execute(config, run.plan(config, store, "table"), store)
         baked = layouts.of(config.table).load(store.open("table", made["table"].key))
         field = surface.load(store.open("surface", made["surface"].key))
