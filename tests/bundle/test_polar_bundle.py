@@ -176,9 +176,7 @@ def test_auto_takes_the_fewest_textures_within_the_budget(bake: Baker, tmp_path:
 
 
 @pytest.mark.slow
-def test_auto_takes_all_textures_if_no_number_keeps_the_budget(
-    bake: Baker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_auto_takes_all_textures_if_no_number_keeps_the_budget(bake: Baker, monkeypatch: pytest.MonkeyPatch) -> None:
     tried = []
     measure = polar_storage._Measure.__call__
 
