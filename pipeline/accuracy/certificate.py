@@ -64,10 +64,15 @@ def measure(
     Raises AccuracyError where the two algorithms of the reference differ, or where setting negative values to 0
     changes colours by more than the budget.
     """
+    found = _measured(interpolate, reference, config, progress)
+    refuse_clamping(found.random, config)
+    return found
+
+
+def _measured(interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress) -> Certificate:
     checked = check_reference(reference.fields[0], reference.first, config)
     random = check_random(interpolate, reference, config, progress)
     exposure = config.accuracy.exposure_ru
-    refuse_clamping(random, config)
     return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, checked)
 
 
@@ -91,13 +96,14 @@ def certify(
     Returns the certificate, with the budget of the plan.
     Raises AccuracyError where the table misses it, or where the two algorithms of the reference differ.
     """
-    found = replace(measure(interpolate, reference, config, progress), delta_e=config.budget_delta_e)
+    found = replace(_measured(interpolate, reference, config, progress), delta_e=config.budget_delta_e)
     if found.measured > config.budget_delta_e:
         raise AccuracyError(
             f"the table misses its budget: on {found.random.directions} random directions its mean CIELAB error at "
             f"{found.exposure_ru:g} RU is {found.measured:.3g}, and accuracy.delta_e allows "
             f"{config.budget_delta_e:g}. {_remedy(reference, config)}"
         )
+    refuse_clamping(found.random, config)
     return found
 
 

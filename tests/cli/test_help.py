@@ -66,14 +66,15 @@ def test_store_list(baked: Tool) -> None:
     found: dict[str, list[str]] = {}
     for artifact in printed["artifacts"]:
         assert artifact["name"] == "small"
-        assert artifact["bytes"] > 0
+        # textures without loss are the table, which they do not copy
+        assert artifact["bytes"] > 0 or artifact["stage"] == "textures"
         found.setdefault(artifact["stage"], []).append(artifact["key"])
     assert found == baked.artifacts()
     lines = baked("store", "list").stdout.splitlines()
     assert lines[0].split() == ["stage", "name", "MiB", "key"]
-    assert len(lines) == 1 + 6 + 1
+    assert len(lines) == 1 + 7 + 1
     assert too_wide("\n".join(lines[:-1])) == []
-    assert lines[-1].startswith("6 artifacts, ")
+    assert lines[-1].startswith("7 artifacts, ")
 
 
 def test_an_empty_store(tool: Tool) -> None:
@@ -85,7 +86,7 @@ def test_an_empty_store(tool: Tool) -> None:
 
 def test_collect_removes_artifacts_that_were_long_unused(copy: Tool) -> None:
     assert copy("store", "collect", "--unused-days", "1").stdout.startswith("removed 0 folders")
-    assert copy("store", "collect", "--unused-days", "0").stdout.startswith("removed 6 folders")
+    assert copy("store", "collect", "--unused-days", "0").stdout.startswith("removed 7 folders")
     assert copy.artifacts() == {}
     # the results stand on their own
     assert copy("verify", copy.bundle()).code == 0

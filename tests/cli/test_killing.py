@@ -101,7 +101,7 @@ def test_signalled_at_work(tool: Tool, name: str, code: int, word: str) -> None:
     assert result.code == code
     assert result.stderr.splitlines()[-1] == f"{word}; finished stages are kept"
     assert "Traceback" not in result.stderr
-    assert list(tool.artifacts()) == ["render", "stack", "surface", "table"]
+    assert list(tool.artifacts()) == ["render", "stack", "surface", "table", "textures"]
     assert temporary_files(tool) == []
 
 

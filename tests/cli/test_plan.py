@@ -33,7 +33,7 @@ def test_a_changed_key_is_named_with_both_values_and_its_consequences(copy: Tool
     assert steps["stack"]["reason"] == "changed: tolerance 0.0001 -> 0.01"
     assert steps["table"]["reason"] == "changed: table.tolerance 0.0001 -> 0.01"
     assert steps["render"]["reason"] == "its input will be made: table, textures"
-    assert steps["validate"]["reason"] == "its input will be made: render, stack, table"
+    assert steps["validate"]["reason"] == "its input will be made: render, stack, table, textures"
     assert copy.artifacts() == before
 
 

@@ -85,7 +85,7 @@ def test_validation_tells_the_errors_of_the_certificate(first: Tool) -> None:
 
 def test_a_second_illuminant_reuses_the_power_spectrum(polar: Tool) -> None:
     printed = states(polar, write(polar, spectrum={"illuminant": "A"}))
-    assert [printed[stage] for stage in STAGES] == ["cached", "cached", *["to do"] * 4]
+    assert [printed[stage] for stage in STAGES] == ["cached", "cached", *["to do"] * 5]
     observer = "CIE 1964 10 Degree Standard Observer"
     assert states(polar, write(polar, spectrum={"observer": observer}))["power_spectrum"] == "cached"
     material = {"fresnel": "conductor", "metal": "Au"}
