@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from cli import console
+from pipeline.store.files import shown
 
 
 @click.command("inspect")
@@ -50,7 +51,7 @@ def inspect_command(
         console.print_json(found)
         return
     for key, value in found.items():
-        click.echo(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
+        click.echo(shown(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}"))
 
 
 def _print_formats(as_json: bool) -> None:
@@ -76,15 +77,13 @@ def _schema(document: str) -> dict[str, Any]:
 
 
 def _bundle(folder: Path) -> dict[str, Any]:
+    from pipeline.bundle import document
     from pipeline.errors import DamagedError
 
     try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DamagedError(f"{folder}: not a bundle: manifest.json cannot be read ({error})") from None
-    if not isinstance(manifest, dict):
-        raise DamagedError(f"{folder}: not a bundle: manifest.json is not a JSON object")
-    return manifest
+        return document.read(folder)
+    except DamagedError as error:
+        raise DamagedError(f"{folder}: not a bundle: {error}") from None
 
 
 def _config(path: Path) -> dict[str, Any]:

@@ -39,6 +39,11 @@ def listing(folder: Path, expected: Iterable[str]) -> tuple[dict[str, int], list
     return dict(sorted(found.items())), sorted(faults)
 
 
+def shown(text: str) -> str:
+    """Escapes a text where a terminal could not print it or would obey it: file names and contents from elsewhere."""
+    return text if text.isprintable() else text.encode("unicode_escape", "surrogatepass").decode("ascii")
+
+
 def read_text(path: Path, most_bytes: int) -> str:
     """Reads a plain file of UTF-8 text.
 

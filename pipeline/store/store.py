@@ -305,7 +305,9 @@ def _unchanged(path: Path, size: int, entry: dict[str, Any]) -> bool:
 
 
 def _damage(folder: Path, faults: list[str]) -> str:
-    some = ", ".join(faults[:3]) + (f" and {len(faults) - 3} more" if len(faults) > 3 else "")
+    some = ", ".join(files.shown(fault) for fault in faults[:3]) + (
+        f" and {len(faults) - 3} more" if len(faults) > 3 else ""
+    )
     return f"{folder}: {some}. `diffract-bake store collect` removes damaged artifacts; then run again"
 
 
