@@ -7,7 +7,7 @@ BAKE := $(VENV)/bin/diffract-bake
 OUT ?= out
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
+.PHONY: fuzz-bundles help setup bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -20,6 +20,7 @@ help:
 	@echo "make lint                    run ruff and mypy"
 	@echo "make format                  fix and format the code with ruff"
 	@echo "make coverage                lines and branches that the fast tests run"
+	@echo "make fuzz-bundles            verify and evaluate 1000 mutated bundles, and count the exit codes"
 	@echo "make profile CONFIG=...      where a warm bake of a config spends its time"
 	@echo "make setup                   set up, and do nothing else"
 	@echo "make clean                   remove the environment and $(OUT)"
@@ -80,6 +81,11 @@ bench: setup
 VALIDATED := $(if $(wildcard ../shared/data/snakes),--elaphe tests/scans/elaphe_scan.toml --xenopeltis tests/scans/xenopeltis_scan.toml)
 validation: setup
 	$(BAKE) bench figures $(VALIDATED) --out $(OUT)/figures
+
+# commands on mutated bundles, each within 5 s and 1 GB: every exit code but 0 and 6 is a fault
+FUZZED_BUNDLES ?= 1000
+fuzz-bundles: setup
+	OPENBLAS_NUM_THREADS=1 nice -n 19 $(VENV)/bin/python -m tests.fuzz.bundles --count $(FUZZED_BUNDLES)
 
 lint: $(VENV)/ready
 	$(VENV)/bin/ruff check .

@@ -1,6 +1,7 @@
 """Image files: EXR for numbers, PNG for display."""
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -83,13 +84,13 @@ def decode(path: Path) -> dict[str, NDArray[Any]]:
             return {name: channel.pixels for name, channel in file.channels().items()}
     # OpenEXR raises errors of many classes
     except Exception as error:
-        text = " ".join(str(error).split())
+        text = " ".join(str(error).split()).rstrip(".")
         raise DamagedError(f"cannot be read as EXR: {text or type(error).__name__}") from None
 
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Discards what libraries in C write to stderr within the block."""
+    """Discards what a library prints within the block: OpenEXR's C++ writes to stderr, its Python to sys.stdout."""
     try:
         kept = os.dup(2)
     except OSError:
@@ -99,7 +100,8 @@ def _quiet() -> Iterator[None]:
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:
-        yield
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)
