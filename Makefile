@@ -9,6 +9,7 @@ OUT ?= out
 
 .DEFAULT_GOAL := help
 .PHONY: help setup lock bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
+.PHONY: fuzz-bundles
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -21,6 +22,7 @@ help:
 	@echo "make lint                    run ruff and mypy"
 	@echo "make format                  fix and format the code with ruff"
 	@echo "make coverage                lines and branches that the fast tests run"
+	@echo "make fuzz-bundles            verify and evaluate 1000 mutated bundles, and count the exit codes"
 	@echo "make profile CONFIG=...      where a warm bake of a config spends its time"
 	@echo "make lock                    pin the packages of setup again, with the digests of their files"
 	@echo "make kills                   kill 300 runs and interrupt 200 at random moments: the next run is unharmed"
@@ -91,6 +93,11 @@ bench: setup
 VALIDATED := $(if $(wildcard ../shared/data/snakes),--elaphe tests/scans/elaphe_scan.toml --xenopeltis tests/scans/xenopeltis_scan.toml)
 validation: setup
 	$(BAKE) bench figures $(VALIDATED) --out $(OUT)/figures
+
+# commands on mutated bundles, each within 5 s and 1 GB: every exit code but 0 and 6 is a fault
+FUZZED_BUNDLES ?= 1000
+fuzz-bundles: setup
+	OPENBLAS_NUM_THREADS=1 nice -n 19 $(VENV)/bin/python -m tests.fuzz.bundles --count $(FUZZED_BUNDLES)
 
 lint: $(VENV)/ready
 	$(VENV)/bin/ruff check .

@@ -135,7 +135,7 @@ def warning_reporter(config: Any, store: Any) -> Callable[[Any, float | None], N
 
     def on_step(step: Any, seconds: float | None) -> None:  # noqa: ARG001
         if step.stage.name == "surface":
-            for text in store.describe("surface", step.key).summary["warnings"]:
+            for text in store.describe("surface", step.key).measured("warnings", list):
                 warn(f"{config.name}: {text}")
 
     return on_step

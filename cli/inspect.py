@@ -76,15 +76,13 @@ def _schema(document: str) -> dict[str, Any]:
 
 
 def _bundle(folder: Path) -> dict[str, Any]:
+    from pipeline.bundle import document
     from pipeline.errors import DamagedError
 
     try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DamagedError(f"{folder}: not a bundle: manifest.json cannot be read ({error})") from None
-    if not isinstance(manifest, dict):
-        raise DamagedError(f"{folder}: not a bundle: manifest.json is not a JSON object")
-    return manifest
+        return document.read(folder)
+    except DamagedError as error:
+        raise DamagedError(f"{folder}: not a bundle: {error}") from None
 
 
 def _config(path: Path) -> dict[str, Any]:

@@ -36,14 +36,24 @@ def publish_command(config_path: Path, out: Path, store_root: Path | None, as_js
 @click.argument("bundle", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @console.json_option
 def verify_command(bundle: Path, as_json: bool) -> None:
-    """Check that BUNDLE has not changed since its publication: every file, the manifest, the sizes of the tables."""
-    from pipeline.bundle.verify import verify
+    """Check that BUNDLE has not changed since its publication: every file, the manifest, the texels of the tables.
+
+    A renamed folder is accepted where its files match SHA256SUMS.
+    """
+    from pipeline.bundle.verify import renamed, verify
     from pipeline.errors import DamagedError
 
     faults = verify(bundle)
+    digest = None if faults else renamed(bundle)
     if as_json:
-        console.print_json({"bundle": str(bundle), "faults": faults})
+        found = {} if digest is None else {"renamed": True, "digest": digest}
+        console.print_json({"bundle": str(bundle), "faults": faults, **found})
     if faults:
         raise DamagedError(*(f"{bundle}: {fault}" for fault in faults))
-    if not as_json:
+    if not as_json and digest is None:
         console.say(f"{bundle}: unchanged")
+    elif not as_json:
+        console.say(
+            f"{bundle}: all files match SHA256SUMS; the folder was renamed, so that its name no longer carries the "
+            f"digest {digest}"
+        )

@@ -20,7 +20,10 @@ def store_command() -> None:
 def list_command(store_root: Path | None, as_json: bool) -> None:
     """List the artifacts: stage, name, size and address."""
     store = console.open_store(store_root)
-    found = [{"stage": a.stage, "name": a.record["name"], "bytes": a.bytes, "key": a.key} for a in store.artifacts()]
+    found = [
+        {"stage": a.stage, "name": a.record.get("name", ""), "bytes": a.bytes, "key": a.key}
+        for a in store.artifacts()
+    ]
     if as_json:
         console.print_json({"root": str(store.root), "artifacts": found})
         return

@@ -7,17 +7,19 @@ import hashlib
 import re
 from pathlib import Path, PurePosixPath
 
-from pipeline.store import digest
+from pipeline.errors import DamagedError
+from pipeline.store import digest, files
 
 SUMS = "SHA256SUMS"
+_MOST_BYTES = 2**20
 _SHOWN = 12
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
 def write(folder: Path) -> str:
     """Writes SHA256SUMS of all files of a folder, sorted by name, and returns its digest, 12 hex digits."""
-    files = digest.of_folder(folder)
-    lines = [f"{files[name]['sha256']}  {name}\n" for name in sorted(files)]
+    found = digest.of_folder(folder)
+    lines = [f"{found[name]['sha256']}  {name}\n" for name in sorted(found)]
     (folder / SUMS).write_text("".join(lines), encoding="utf-8", newline="\n")
     return of_sums(folder)
 
@@ -25,6 +27,20 @@ def write(folder: Path) -> str:
 def of_sums(folder: Path) -> str:
     """Computes the digest of a bundle, the first 12 hex digits of the SHA-256 of SHA256SUMS."""
     return hashlib.sha256((folder / SUMS).read_bytes()).hexdigest()[:_SHOWN]
+
+
+def read(folder: Path) -> str:
+    """Reads the text of SHA256SUMS. Raises DamagedError, which names no folder, where it is not a bundle's."""
+    try:
+        return files.read_text(folder / SUMS, _MOST_BYTES)
+    except FileNotFoundError:
+        raise DamagedError(f"{SUMS} is missing: nothing can be checked") from None
+    except UnicodeDecodeError:
+        raise DamagedError(f"{SUMS} is not UTF-8 text") from None
+    except OSError as error:
+        raise DamagedError(f"{SUMS} cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise DamagedError(f"{SUMS} cannot be read: {error}") from None
 
 
 def parse(text: str) -> tuple[dict[str, str], list[str]]:

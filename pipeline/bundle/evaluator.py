@@ -26,7 +26,10 @@ class BundleTables:
     def __init__(self, folder: Path) -> None:
         self.manifest: dict[str, Any] = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         images = sorted(self.manifest["tables"], key=lambda entry: int(entry["index"]))
-        planes = [read_rgba(folder / entry["file"]) for entry in images]
+        size = self.manifest["grid"]["height"], self.manifest["grid"]["width"]
+        planes = [read_rgba(folder / "tables" / Path(entry["file"]).name, size) for entry in images]
+        if not all(np.isfinite(plane).all() for plane in planes):
+            raise ValueError("expected texels that are finite numbers")
         layout = {"taylor": TaylorTextures, "polar": PolarTextures}[self.manifest["grid"]["layout"]]
         self.table = layout(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
@@ -118,6 +121,8 @@ class TaylorTextures:
         self.i_p = np.stack([plane[..., :3] for plane in planes], axis=-1)
         self.scale, self.computed = scale, planes[0][..., 3] == 1.0
         self.n, self.power = int(grid["width"]), float(grid["power"])
+        if not self.power > 0.0:
+            raise ValueError(f"expected a power above 0, got {self.power}")
 
     def value(self, u: Array, v: Array, w: Array) -> Array:
         """Computes sum_p w^p I_p(u, v), (directions, 3)."""
@@ -142,8 +147,12 @@ class TaylorTextures:
         return total
 
 
-def read_rgba(path: Path) -> NDArray[Any]:
-    """Reads the pixels (row, column, RGBA) of an EXR; row 0 is its first line."""
+def read_rgba(path: Path, size: tuple[int, int]) -> NDArray[Any]:
+    """Reads the pixels (row, column, RGBA) of an EXR of `size` rows and columns; row 0 is its first line."""
+    with OpenEXR.File(str(path), header_only=True) as file:
+        first, last = file.header()["dataWindow"]
+    if (last[1] - first[1] + 1, last[0] - first[0] + 1) != size:
+        raise ValueError(f"{path}: expected {size} rows and columns, as the manifest states")
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return np.stack([file.channels()[name].pixels for name in "RGBA"], axis=-1)
 
@@ -178,7 +187,7 @@ if __name__ == "__main__":
     try:
         angles = read_directions(Path(sys.argv[1]).read_text(encoding="utf-8-sig"))
         found = BundleTables(Path(__file__).parent).signed(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
         sys.exit(f"{sys.argv[1]}: {error}")
     print("X,Y,Z", *(",".join(f"{value:.12g}" for value in row) for row in np.fmax(found, 0.0)), sep="\n")
     for count, why in ((np.isnan(found).any(1).sum(), "not computed"), ((found < 0.0).any(1).sum(), "negative")):

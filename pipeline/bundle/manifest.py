@@ -1,22 +1,32 @@
 """The schema of manifest.json. Grid, images and storage loss of a table have entries for each layout.
 
 A manifest holds nothing that differs between two publications of the same content: no time, host, folder or run time.
+Ranges are those that a bake can give, and keep the evaluator's numbers finite: a bundle may come from anywhere.
 """
 
 import json
-from typing import Annotated, Any, Literal
+import math
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RelativeError
 from pipeline.bundle.material import MaterialEntry
 from pipeline.optics.colour import ColourError
-from pipeline.validated import Validated
+from pipeline.validated import Finite, Positive, Validated
 
-MANIFEST = "manifest.json"
 SCHEMA_VERSION: Literal[3] = 3
-Normal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=1, le=2**31)]
+# a power of two that fits values into half floats, at most a float32's largest number
+Scale = Annotated[float, Field(ge=1e-60, le=1e60)]
+Length = Annotated[float, Field(ge=1e-9, le=1e9)]
+Error = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Coefficient = Annotated[float, Field(ge=-1e30, le=1e30)]
+_MOST_TABLES, _MOST_MAPS, _MOST_TERMS = 1024, 4096, 1024
+_MOST_SIDE = 32768
+_MOST_LOG_ENVELOPE = 230.0
 
 # --- images --------------------------------------------------------------------------------------------
 
@@ -25,9 +35,9 @@ class Image(Validated):
     """An EXR of the bundle; row 0 is its first line."""
 
     file: Annotated[str, Field(pattern=r"^(tables|maps)/[A-Za-z0-9_.+-]+\.exr$")]
-    width: int
-    height: int
-    channels: list[str]
+    width: Annotated[int, Field(ge=1, le=_MOST_SIDE)]
+    height: Annotated[int, Field(ge=1, le=_MOST_SIDE)]
+    channels: Annotated[list[str], Field(min_length=1, max_length=4)]
     pixel_type: Literal["float", "half"]
 
 
@@ -36,8 +46,8 @@ class TaylorImage(Image):
 
     layout: Literal["taylor"]
     index: Annotated[int, Field(ge=0)]
-    scale: Normal
-    half_subnormal_share: float | None
+    scale: Scale
+    half_subnormal_share: Share | None
 
 
 class PolarImage(Image):
@@ -45,8 +55,8 @@ class PolarImage(Image):
 
     layout: Literal["polar"]
     index: Annotated[int, Field(ge=0)]
-    scale: Annotated[list[Normal], Field(min_length=4, max_length=4)]
-    half_subnormal_share: float | None
+    scale: Annotated[list[Scale], Field(min_length=4, max_length=4)]
+    half_subnormal_share: Share | None
 
 
 TableImage = Annotated[TaylorImage | PolarImage, Field(discriminator="layout")]
@@ -59,12 +69,12 @@ class MapImage(Image):
     clipped_share: of the views, those whose colour at the exposure is outside the gamut of sRGB or above its white.
     """
 
-    theta_deg: float
-    phi_deg: float
-    png: str
-    exposure_ru: float
-    negative_share: float
-    clipped_share: float
+    theta_deg: Annotated[float, Field(ge=0, lt=90)]
+    phi_deg: Finite
+    png: Annotated[str, Field(pattern=r"^maps/[A-Za-z0-9_.+-]+\.png$")]
+    exposure_ru: Positive
+    negative_share: Share
+    clipped_share: Share
 
 
 # --- grids ---------------------------------------------------------------------------------------------
@@ -74,10 +84,10 @@ class TaylorGridEntry(Validated):
     """Positions of the texels of a Taylor table in (u, v)."""
 
     layout: Literal["taylor"]
-    width: int
-    height: int
-    power: float
-    u_max: float
+    width: Annotated[int, Field(ge=3, le=4001)]
+    height: Annotated[int, Field(ge=3, le=4001)]
+    power: Annotated[float, Field(ge=1, le=9)]
+    u_max: Annotated[float, Field(ge=2, le=2)]
     columns: str = "u grows with the column, from -u_max at column 0"
     rows: str = "v grows with the row, from -u_max at row 0 (the first line of the image)"
     node: str = "u = u_max |t|^a sign(t), a = power; v likewise"
@@ -95,17 +105,17 @@ class PolarGridEntry(Validated):
     """
 
     layout: Literal["polar"]
-    width: int
-    height: int
-    r0: Normal
-    step: Normal
-    rho_max: Normal
-    stretch: Normal
-    axis_rad: float
-    w_terms: int
-    envelope_radius: Normal
-    envelope_exponent: float
-    basis: list[list[list[float]]] | None
+    width: Annotated[int, Field(ge=4, le=_MOST_SIDE, multiple_of=2)]
+    height: Annotated[int, Field(ge=2, le=4096)]
+    r0: Length
+    step: Length
+    rho_max: Annotated[float, Field(ge=1e-9, le=2)]
+    stretch: Length
+    axis_rad: Annotated[float, Field(ge=-7, le=7)]
+    w_terms: Annotated[int, Field(ge=1, le=_MOST_TERMS)]
+    envelope_radius: Length
+    envelope_exponent: Finite
+    basis: list[list[list[Coefficient]]] | None
     rows: str = (
         "row i (row 0 is the first line of the image) is the ring rho = r0 sinh(i step), rho = sqrt(u^2 + v^2), "
         "step = asinh(rho_max / r0) / (height - 1); so i = asinh(rho / r0) / step"
@@ -134,6 +144,19 @@ class PolarGridEntry(Validated):
         "w_max = sqrt(max(4 - rho^2, 1e-6)), x clamped to [-1, 1]"
     )
 
+    @model_validator(mode="after")
+    def is_a_grid(self) -> Self:
+        """Checks that the step leads to the last ring, and that the envelope fits a double.
+
+        Raises ValueError, which pydantic reports.
+        """
+        expected = math.asinh(self.rho_max / self.r0) / (self.height - 1)
+        if not math.isclose(self.step, expected, rel_tol=1e-9):
+            raise ValueError(f"step is {self.step:g}, but r0, rho_max and height give {expected:g}")
+        if abs(self.envelope_exponent) * math.log1p((2.0 / self.envelope_radius) ** 2) > _MOST_LOG_ENVELOPE:
+            raise ValueError("envelope_radius and envelope_exponent give an envelope beyond 1e100 or below 1e-100")
+        return self
+
 
 Grid = Annotated[TaylorGridEntry | PolarGridEntry, Field(discriminator="layout")]
 
@@ -149,12 +172,12 @@ class TaylorLoss(Validated):
     """
 
     layout: Literal["taylor"]
-    directions: int
+    directions: Count
     relative_error_of_y: dict[str, RelativeError]
-    floor: float
-    exposure_ru: float
-    largest_delta_e: float
-    subnormal_share: float
+    floor: Positive
+    exposure_ru: Positive
+    largest_delta_e: Error
+    subnormal_share: Share
 
 
 class PolarLoss(Validated):
@@ -168,15 +191,15 @@ class PolarLoss(Validated):
     """
 
     layout: Literal["polar"]
-    directions: int
-    textures: int
-    most_textures: int
+    directions: Count
+    textures: Count
+    most_textures: Count
     error: ColourError
     added: ColourError
     added_in_mirror: ColourError
     y_in_mirror: RelativeError
     mirror_kept: bool
-    subnormal_share: float | None
+    subnormal_share: Share | None
 
 
 StorageLoss = Annotated[TaylorLoss | PolarLoss, Field(discriminator="layout")]
@@ -194,12 +217,12 @@ class Colour(Validated):
     space: str = "CIE XYZ, linear (not sRGB)"
     observer: str
     illuminant: dict[str, Any]
-    range_nm: list[float]
-    step_nm: float | None
-    wavelengths: int
+    range_nm: Annotated[list[Positive], Field(min_length=2, max_length=2)]
+    step_nm: Positive | None
+    wavelengths: Count
     normalisation: Literal["relative", "absolute"]
     white: str
-    mirror_y: Normal
+    mirror_y: Positive
     exposure: str = "a picture at an exposure of E RU shows XYZ E / mirror_y in sRGB, clipped to its gamut"
 
 
@@ -213,10 +236,10 @@ class Coverage(Validated):
     band_limit_per_um: the Nyquist limits along x and y, 1/um.
     """
 
-    unknown_share: float
-    skipped_share: float
-    known_radius: float
-    band_limit_per_um: list[float]
+    unknown_share: Share
+    skipped_share: Share
+    known_radius: Annotated[float, Field(ge=0, le=2)]
+    band_limit_per_um: Annotated[list[Positive], Field(min_length=2, max_length=2)]
 
 
 class Domain(Validated):
@@ -232,11 +255,11 @@ class Domain(Validated):
         "errors are of an order's efficiency, shares of what the flat surface reflects, for smooth slopes and for "
         "edges; within: both are at most `tolerated`; null: beyond what was compared, or a surface without a period"
     )
-    lambda_nm: float
-    period_over_lambda: float | None
-    error_of_smooth: float | None
-    error_of_edged: float | None
-    tolerated: float
+    lambda_nm: Positive
+    period_over_lambda: Positive | None
+    error_of_smooth: Error | None
+    error_of_edged: Error | None
+    tolerated: Error
     within: bool | None
 
 
@@ -261,8 +284,8 @@ class Manifest(Validated):
     """The content of manifest.json."""
 
     schema_version: Literal[3]
-    name: str
-    version: str
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+    version: Annotated[str, Field(pattern=r"^\d+\.\d+\.\d+$")]
     licence: str
     made_by: MadeBy
     conventions: dict[str, str]
@@ -272,9 +295,9 @@ class Manifest(Validated):
     colour: Colour
     material: MaterialEntry
     precision: Literal["float", "half"]
-    tables: Annotated[list[TableImage], Field(min_length=1)]
-    maps: list[MapImage]
-    report: str | None
+    tables: Annotated[list[TableImage], Field(min_length=1, max_length=_MOST_TABLES)]
+    maps: Annotated[list[MapImage], Field(max_length=_MOST_MAPS)]
+    report: Literal["report.html"] | None
     coverage: Coverage
     domain: Domain
     plan: dict[str, Any]

@@ -1,16 +1,18 @@
 """The manifest's entry on the material: the factor C with all its numbers, so that a shader needs no other table."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.optics import fresnel
 from pipeline.optics.light import trapezoid
-from pipeline.validated import Validated
+from pipeline.validated import Positive, Validated
 
 REFLECTANCE = "reflectance.csv"
 _NODES = 257
@@ -36,19 +38,32 @@ INSIDE = "R = 1: the metal's reflectance, at every angle and wavelength, is insi
 class Samples(Validated):
     """Index n + ik of the medium at wavelengths, nm, and the weight of each in R; one sample without dispersion."""
 
-    lambda_nm: list[float] | None
-    n: list[float]
-    k: list[float]
-    luminous_weight: list[float]
+    lambda_nm: list[Positive] | None
+    n: Annotated[list[Annotated[float, Field(ge=1e-6, le=1e6)]], Field(min_length=1)]
+    k: list[Annotated[float, Field(ge=0, le=1e6)]]
+    luminous_weight: list[Annotated[float, Field(ge=-10, le=10)]]
+
+    @model_validator(mode="after")
+    def has_as_many_of_each(self) -> Self:
+        """Checks the lengths of all lists, and that the weights are those of a mean.
+
+        Raises ValueError, which pydantic reports.
+        """
+        lengths = {len(self.n), len(self.k), len(self.luminous_weight)}
+        if len(lengths | ({len(self.lambda_nm)} if self.lambda_nm is not None else {1})) > 1:
+            raise ValueError("lambda_nm, n, k and luminous_weight differ in length")
+        if not math.isclose(math.fsum(self.luminous_weight), 1.0, rel_tol=1e-6):
+            raise ValueError(f"luminous_weight sums to {math.fsum(self.luminous_weight):g}, not to 1")
+        return self
 
 
 class ReflectanceTable(Validated):
     """R on equidistant nodes of cos_half in [0, 1], for shaders; largest_error: of R interpolated between them."""
 
     file: Literal["reflectance.csv"]
-    nodes: int
+    nodes: Annotated[int, Field(ge=2, le=100_000)]
     interpolation: Literal["linear"]
-    largest_error: float
+    largest_error: Annotated[float, Field(ge=0, le=1)]
 
 
 class MaterialEntry(Validated):
@@ -57,16 +72,27 @@ class MaterialEntry(Validated):
     fresnel: Literal["none", "schlick", "dielectric", "conductor"]
     normalisation: Literal["relative", "absolute"]
     shadowing: bool
-    ior: float | None
+    ior: Positive | None
     metal: str | None
     formula: str
     reflectance: str
     shadowing_formula: str
-    schlick_f0: float | None
+    schlick_f0: Annotated[float, Field(ge=0, le=1)] | None
     samples: Samples | None
-    divisor: float
+    divisor: Annotated[float, Field(ge=1e-30, le=1)]
     exponent: Literal[1, 2]
     reflectance_table: ReflectanceTable | None
+
+    @model_validator(mode="after")
+    def has_what_its_formula_needs(self) -> Self:
+        """Checks that the reflectance's numbers are there. Raises ValueError, which pydantic reports."""
+        if (self.schlick_f0 is not None) != (self.fresnel == "schlick"):
+            raise ValueError("schlick_f0 belongs to fresnel = schlick")
+        if self.samples is None and self.fresnel == "dielectric":
+            raise ValueError("fresnel = dielectric needs samples")
+        if self.samples is not None and self.fresnel not in ("dielectric", "conductor"):
+            raise ValueError(f"fresnel = {self.fresnel} has no samples")
+        return self
 
 
 @dataclass(frozen=True)

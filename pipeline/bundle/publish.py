@@ -5,9 +5,11 @@ import shutil
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 
 from pipeline.bundle import checksums, entries, material, readme
-from pipeline.bundle.manifest import MANIFEST, SCHEMA_VERSION, Manifest, MapImage, TableImage
+from pipeline.bundle.document import MANIFEST
+from pipeline.bundle.manifest import SCHEMA_VERSION, Manifest, MapImage, TableImage
 from pipeline.bundle.prepared import Prepared
 from pipeline.bundle.verify import summary, verify
 from pipeline.config.models import Config
@@ -18,7 +20,8 @@ from pipeline.store import scratch
 from pipeline.store.store import Artifact, writing
 
 EVALUATOR, README = "evaluate.py", "README.md"
-TABLES, MAPS, REPORT = "tables", "maps", "report.html"
+TABLES, MAPS = "tables", "maps"
+REPORT: Literal["report.html"] = "report.html"
 _TEMPORARY = ".publishing-"
 # the line of the evaluator that a bundle's own replaces
 _UNIT = "X,Y,Z are in the unit that manifest.json states."

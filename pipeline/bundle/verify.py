@@ -1,19 +1,29 @@
-"""Verification: a bundle's files are those that were published, and agree with its manifest."""
+"""Verification: a bundle's files are those that were published, and agree with its manifest.
 
+Nothing is opened but plain files within the folder, and nothing is read that is larger than a bundle's file can be.
+"""
+
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import ValidationError
-
-from pipeline.bundle import checksums
+from pipeline.bundle import checksums, contents
 from pipeline.bundle.checksums import SUMS
-from pipeline.bundle.manifest import MANIFEST, Image, Manifest, PolarGridEntry
+from pipeline.bundle.document import MANIFEST
+from pipeline.bundle.manifest import Manifest
 from pipeline.errors import DamagedError
-from pipeline.report import images
-from pipeline.store import digest
+from pipeline.report import exr
+from pipeline.store import digest, files
 
 if TYPE_CHECKING:
     from pipeline.bundle.evaluator import BundleTables
+
+# the names that `publish` gives
+_NAMED = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]*)\+([0-9a-f]{12})")
+# of a file that is no image of the manifest, and of all of these
+_MOST_BYTES, _MOST_BYTES_OF_ALL = 2**26, 2**29
+_BYTES_OF_A_TEXEL = 16
 
 
 def open_bundle(folder: Path) -> "BundleTables":
@@ -33,24 +43,20 @@ def open_bundle(folder: Path) -> "BundleTables":
 def verify(folder: Path) -> list[str]:
     """Verifies a bundle. Reads no file outside its folder.
 
-    Returns one line for each fault; an empty list where there is none.
+    Returns one line for each fault; an empty list where there is none. A folder may have been renamed, see `renamed`.
     """
     if not folder.is_dir():
         return [f"{folder}: no such folder"]
-    found, faults = _files(folder)
-    if SUMS not in found:
-        return [*faults, f"{SUMS} is missing: nothing can be checked"]
     try:
-        sums, odd = checksums.parse((folder / SUMS).read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        return [*faults, f"{SUMS} is not UTF-8 text"]
-    changed = [name for name in sums if name in found and digest.of_file(folder / name) != sums[name]]
-    faults += odd
-    faults += [f"{name} is missing" for name in sums if name not in found]
-    faults += [f"{name} was added" for name in sorted(found - sums.keys() - {SUMS})]
-    faults += [f"{name} was changed" for name in changed]
-    intact = (found & sums.keys()) - set(changed)
-    return faults + _name_faults(folder) + _manifest_faults(folder, intact)
+        return _faults(folder)
+    except OSError as error:
+        return [f"{error.filename or folder} cannot be read: {error.strerror}"]
+
+
+def renamed(folder: Path) -> str | None:
+    """Returns the digest of a bundle without faults whose folder's name does not carry it; None where it does."""
+    # a link such as "latest" may lead to a bundle, so the name is that of the folder itself
+    return None if _NAMED.fullmatch(folder.resolve().name) else checksums.of_sums(folder)
 
 
 def summary(faults: list[str]) -> str:
@@ -58,84 +64,62 @@ def summary(faults: list[str]) -> str:
     return "; ".join(faults[:3]) + (f" and {len(faults) - 3} more" if len(faults) > 3 else "")
 
 
-def _files(folder: Path) -> tuple[set[str], list[str]]:
-    """Lists the plain files of a bundle, and a fault for everything else, since a link could lead outside."""
-    found, faults = set(), []
-    for path in sorted(folder.rglob("*")):
-        name = path.relative_to(folder).as_posix()
-        if path.is_symlink() or not (path.is_file() or path.is_dir()):
-            faults.append(f"{name} is not a plain file")
-        elif path.is_file():
-            found.add(name)
-    return found, faults
-
-
-def _name_faults(folder: Path) -> list[str]:
-    # a link such as "latest" may lead to a bundle, so the name is that of the folder itself
-    name, _, shown = folder.resolve().name.rpartition("+")
-    expected = checksums.of_sums(folder)
-    if name and shown == expected:
-        return []
-    return [f"the folder is named {folder.resolve().name}, but its content's digest is {expected} ({SUMS})"]
-
-
-def _manifest_faults(folder: Path, intact: set[str]) -> list[str]:
-    """Lists faults of manifest.json and of its statements about images; only intact files are opened."""
-    if MANIFEST not in intact:
-        return []
+def _faults(folder: Path) -> list[str]:
     try:
-        manifest = Manifest.model_validate_json((folder / MANIFEST).read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        return [f"{MANIFEST} is not UTF-8 text"]
-    except ValidationError as error:
-        return [f"{MANIFEST}: {'.'.join(str(key) for key in e['loc'])}: {e['msg']}" for e in error.errors()]
-    faults = _consistency_faults(folder, manifest)
-    for image in (*manifest.tables, *manifest.maps):
-        faults += _image_faults(folder, image, intact)
-    return faults
+        sums, odd = checksums.parse(checksums.read(folder))
+    except DamagedError as error:
+        return [str(error)]
+    sizes, faults = files.listing(folder, [*sums, SUMS])
+    faults += odd
+    if MANIFEST not in sums:
+        faults.append(f"{SUMS} does not name {MANIFEST}")
+    faults += [f"{name} is missing" for name in sums if name not in sizes]
+    faults += [f"{name} was added" for name in sizes if name not in sums and name != SUMS]
+    manifest: Manifest | None = None
+    of_manifest: list[str] = []
+    listed = {name: size for name, size in sizes.items() if name in sums}
+    if MANIFEST in listed and listed[MANIFEST] <= _MOST_BYTES and digest.of_file(folder / MANIFEST) == sums[MANIFEST]:
+        manifest, of_manifest = contents.read(folder)
+    too_large = _too_large(folder, manifest, listed)
+    changed = [name for name in listed if name not in too_large and digest.of_file(folder / name) != sums[name]]
+    faults += [f"{name} was changed" for name in changed]
+    faults += [f"{name} has {listed[name]} bytes, which is not the size of a bundle's file" for name in too_large]
+    faults += _name_faults(folder, manifest) + of_manifest
+    if manifest is None:
+        return faults
+    return faults + contents.faults(folder, manifest, listed.keys() - set(changed) - too_large)
 
 
-def _consistency_faults(folder: Path, manifest: Manifest) -> list[str]:
-    """Lists contradictions within the manifest, and between it and the folder's name."""
-    faults = []
-    called = f"{manifest.name}-{manifest.version}"
-    if folder.resolve().name.rpartition("+")[0] != called:
-        faults.append(f"{MANIFEST}: describes {called}, but the folder is named {folder.resolve().name}")
-    if [table.index for table in manifest.tables] != list(range(len(manifest.tables))):
-        faults.append(f"{MANIFEST}: tables: expected index = 0, 1, ... in order")
-    if isinstance(manifest.grid, PolarGridEntry) and not _basis_fits(manifest.grid, len(manifest.tables)):
-        faults.append(
-            f"{MANIFEST}: grid: {len(manifest.tables)} tables do not hold the outputs that basis and w_terms need"
-        )
-    for table in manifest.tables:
-        if table.layout != manifest.grid.layout:
-            faults.append(f"{MANIFEST}: {table.file} is not of the grid's layout")
-        if (table.width, table.height) != (manifest.grid.width, manifest.grid.height):
-            faults.append(f"{MANIFEST}: {table.file} is not of the grid's size")
-        if table.pixel_type != manifest.precision or set(table.channels) != set(images.RGBA):
-            faults.append(f"{MANIFEST}: {table.file} is not RGBA of precision {manifest.precision}")
-    return faults
+def _too_large(folder: Path, manifest: Manifest | None, sizes: Mapping[str, int]) -> set[str]:
+    """Finds files that are larger than they can be in a bundle, which are not read."""
+    entries = () if manifest is None else (*manifest.tables, *manifest.maps)
+    most = {entry.file: entry.width * entry.height * _BYTES_OF_A_TEXEL + _MOST_BYTES for entry in entries}
+    found = {name for name, size in sizes.items() if size > most.get(name, _MOST_BYTES)}
+    others = [name for name in sizes if name not in most and name not in found]
+    if sum(sizes[name] for name in others) > _MOST_BYTES_OF_ALL:
+        found |= set(others)
+    # a large file without the structure of an image is sparse, or no image
+    large = {name for name in most.keys() & sizes.keys() if sizes[name] > _MOST_BYTES}
+    return found | {name for name in large if not _is_image(folder / name)}
 
 
-def _basis_fits(grid: PolarGridEntry, images: int) -> bool:
-    """Tells whether the basis is (outputs, 3, w_terms) for the outputs that the images hold."""
-    if grid.basis is None:
-        return 4 * images == 3 * grid.w_terms
-    shapes = {(len(output), *(len(channel) for channel in output)) for output in grid.basis}
-    return len(grid.basis) == 4 * images and shapes == {(3, *3 * (grid.w_terms,))}
-
-
-def _image_faults(folder: Path, image: Image, intact: set[str]) -> list[str]:
-    """Lists differences between an EXR and its entry in the manifest; changed files have a fault already."""
-    if image.file not in intact:
-        return [] if (folder / image.file).exists() else [f"{MANIFEST}: names {image.file}, which is missing"]
+def _is_image(path: Path) -> bool:
     try:
-        found = images.describe(folder / image.file)
-    except RuntimeError:
-        return [f"{image.file} cannot be read as EXR"]
-    expected = {key: getattr(image, key) for key in found}
-    return [
-        f"{image.file}: {key} is {found[key]}, but {MANIFEST} says {expected[key]}"
-        for key in found
-        if found[key] != expected[key]
-    ]
+        exr.structure(path)
+    except DamagedError:
+        return False
+    return True
+
+
+def _name_faults(folder: Path, manifest: Manifest | None) -> list[str]:
+    """Compares the folder's name with content and manifest, unless it was renamed and carries no digest."""
+    called = folder.resolve().name
+    carried = _NAMED.fullmatch(called)
+    if carried is None:
+        return []
+    faults, expected = [], checksums.of_sums(folder)
+    if carried[2] != expected:
+        faults.append(f"the folder is named {called}, but its content's digest is {expected} ({SUMS})")
+    if manifest is not None and carried[1] != f"{manifest.name}-{manifest.version}":
+        faults.append(f"{MANIFEST}: describes {manifest.name}-{manifest.version}, but the folder is named {called}")
+    return faults

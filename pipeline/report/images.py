@@ -1,7 +1,10 @@
 """Image files: EXR for numbers, PNG for display."""
 
+import contextlib
+import io
+import os
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Array
-from pipeline.errors import StorageError
+from pipeline.errors import DamagedError, StorageError
 
 # ISO interop ID of linear CIE XYZ, D65 white: without it many readers take Y for luminance and Z for depth
 _XYZ_SPACE = "lin_ciexyzd65_scene"
@@ -75,23 +78,40 @@ def read_xyz(path: Path) -> NDArray[np.float32]:
         return np.stack([channels[f"brdf.{name}"].pixels for name in "XYZ"], axis=-1)
 
 
-def describe(path: Path) -> dict[str, Any]:
-    """Returns the width, height, sorted channel names and pixel type ("float", "half", "uint", "mixed") of an EXR.
+def decode(path: Path) -> dict[str, NDArray[Any]]:
+    """Reads the pixels of an EXR whose structure was checked (`pipeline.report.exr`).
 
-    Raises RuntimeError where the file is not an EXR.
+    Returns each channel (rows, columns) by name.
+    Raises DamagedError, which does not name the file, where OpenEXR cannot decode it.
     """
     import OpenEXR
 
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        channels = file.channels()
-        first, last = file.header()["dataWindow"]
-        types = {channel.type().name.lower() for channel in channels.values()}
-        return {
-            "width": int(last[0] - first[0] + 1),
-            "height": int(last[1] - first[1] + 1),
-            "channels": sorted(channels),
-            "pixel_type": types.pop() if len(types) == 1 else "mixed",
-        }
+    try:
+        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
+            return {name: channel.pixels for name, channel in file.channels().items()}
+    # OpenEXR raises errors of many classes
+    except Exception as error:
+        text = " ".join(str(error).split()).rstrip(".")
+        raise DamagedError(f"cannot be read as EXR: {text or type(error).__name__}") from None
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Discards what a library prints within the block: OpenEXR's C++ writes to stderr, its Python to sys.stdout."""
+    try:
+        kept = os.dup(2)
+    except OSError:
+        # the process has no stderr
+        yield
+        return
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:

@@ -31,7 +31,7 @@ class Results:
     @property
     def missed_budget(self) -> str | None:
         """Returns the error message of a missed error budget; None where it is met or none is set."""
-        budget: dict[str, Any] = self.artifacts["validate"].summary["budget"]
+        budget: dict[str, Any] = self.artifacts["validate"].measured("budget", dict)
         if budget["met"] is not False:
             return None
         return (

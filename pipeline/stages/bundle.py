@@ -8,6 +8,7 @@ from typing import Any
 
 from pipeline import layouts
 from pipeline.config.models import Config
+from pipeline.errors import DamagedError
 from pipeline.progress import Progress
 from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Stage, Summary
@@ -52,7 +53,10 @@ def place(artifact: Artifact, out: Path) -> Path:
     """
     from pipeline.bundle import publish
 
-    return publish.place(artifact.folder / _CONTENT, out, artifact.summary["name"])
+    name = artifact.measured("name", str)
+    if Path(name).name != name:
+        raise DamagedError(f"{artifact.folder}: expected the name of a bundle, got {name!r}; remove this folder")
+    return publish.place(artifact.folder / _CONTENT, out, name)
 
 
 def stage_of(layout: Layout) -> Stage:

@@ -186,9 +186,9 @@ def _reason(stage: Stage, config: Config, made: set[str], last: Artifact | None)
     inputs = sorted(made & set(stage.inputs))
     if last is None:
         return "not made before"
-    if last.record["version"] != stage.version:
+    if last.record.get("version") != stage.version:
         return f"the stage's version is now {stage.version}"
-    changed = _changes(last.record["parameters"], stage.parameters(config))
+    changed = _changes(last.record.get("parameters"), stage.parameters(config))
     if changed:
         return f"changed: {', '.join(changed[:3])}" + (f" and {len(changed) - 3} more" if len(changed) > 3 else "")
     if inputs:
@@ -218,6 +218,7 @@ def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
         "bundle": "tables, maps and report",
     }
     parts = [texts[stage.name]] if stage.name in texts else []
-    if last is not None:
-        parts.append(f"{last.record['provenance']['seconds']:.1f} s last time")
+    seconds = None if last is None else last.record.get("provenance", {}).get("seconds")
+    if seconds is not None:
+        parts.append(f"{seconds:.1f} s last time")
     return ", ".join(parts) or "unknown before it has run once"

@@ -19,13 +19,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import platformdirs
 from filelock import FileLock
 
 from pipeline.errors import DamagedError, StorageError
-from pipeline.store import digest, scratch
+from pipeline.store import digest, files, scratch
 
 RECORD = "artifact.json"
 FORMAT = 1
@@ -43,6 +43,18 @@ _REFUSALS = (
     errno.EIO,
 )
 _KEY = re.compile("[0-9a-f]{64}")
+_RECORD_BYTES = 16 * 2**20
+_REQUIRED = {"stage": str, "key": str, "files": dict}
+_TYPES = {
+    **_REQUIRED,
+    "name": str,
+    "version": int,
+    "parameters": dict,
+    "inputs": dict,
+    "summary": dict,
+    "provenance": dict,
+}
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -67,6 +79,13 @@ class Artifact:
         """The values that the stage measured and chose."""
         return dict(self.record["summary"])
 
+    def measured(self, key: str, kind: type[_T]) -> _T:
+        """Returns a value of the summary. Raises DamagedError where it is missing or of another type than `kind`."""
+        value = self.record.get("summary", {}).get(key)
+        if not isinstance(value, kind):
+            raise DamagedError(_damage(self.folder, [f"{RECORD}: expected {key} of type {kind.__name__}"]))
+        return value
+
     @property
     def bytes(self) -> int:
         """Size of all files."""
@@ -90,8 +109,8 @@ class Store:
         return self.root / stage / key
 
     def has(self, stage: str, key: str) -> bool:
-        """Whether the artifact exists. Its files are checked by `open`."""
-        return self.folder(stage, key).is_dir()
+        """Whether anything is at the artifact's address. `describe` and `open` check that it is the artifact."""
+        return os.path.lexists(self.folder(stage, key))
 
     def describe(self, stage: str, key: str) -> Artifact:
         """Reads the record of an artifact and checks it, without its files. Raises DamagedError."""
@@ -155,8 +174,8 @@ class Store:
         return found
 
     def _folders(self) -> list[Path]:
-        """Lists the folders that are named like artifacts; the store neither judges nor removes any others."""
-        return sorted(p for p in self.root.glob("*/*") if _KEY.fullmatch(p.name) and p.is_dir())
+        """Lists what is named like an artifact; the store neither judges nor removes anything else."""
+        return sorted(p for p in self.root.glob("*/*") if _KEY.fullmatch(p.name))
 
     def check(self) -> list[str]:
         """Checks all artifacts; returns one line for each that has changed since it was written."""
@@ -187,9 +206,9 @@ class Store:
                 damaged = True
             if damaged or (keep_days is not None and _age_s(folder / RECORD, now) > keep_days * 86400.0):
                 doomed.append(folder)
-        freed = sum(f.stat().st_size for folder in doomed for f in folder.rglob("*") if f.is_file())
-        for folder in doomed:
-            shutil.rmtree(folder, ignore_errors=True)
+        freed = sum(_bytes(path) for path in doomed)
+        for path in doomed:
+            _remove(path)
         return len(doomed), freed
 
     def touch(self, stage: str, key: str) -> None:
@@ -198,19 +217,58 @@ class Store:
             os.utime(self.folder(stage, key) / RECORD)
 
     def _read(self, folder: Path) -> Artifact:
+        if folder.is_symlink() or not folder.is_dir():
+            raise DamagedError(_damage(folder, ["expected a folder, found something else"]))
         try:
-            record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+            record = json.loads(files.read_text(folder / RECORD, _RECORD_BYTES))
             sealed = record.pop("seal")
             unchanged = digest.of_json(record) == sealed
+            odd = _odd_entries(record)
         except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
             fault = f"{RECORD} cannot be read ({type(error).__name__})"
             raise DamagedError(_damage(folder, [fault])) from None
         if not unchanged:
             raise DamagedError(_damage(folder, [f"{RECORD} was changed after it was written"]))
+        if odd:
+            raise DamagedError(_damage(folder, [f"{RECORD}: {', '.join(odd)} of a wrong type"]))
         artifact = Artifact(folder, record)
         if (artifact.stage, artifact.key) != (folder.parent.name, folder.name):
             raise DamagedError(_damage(folder, [f"it holds {artifact.stage}/{artifact.key}"]))
         return artifact
+
+
+def _odd_entries(record: dict[str, Any]) -> list[str]:
+    """Lists the entries of a record that are missing or not of their type.
+
+    Raises ValueError where a text cannot be printed, because it holds half of a surrogate pair.
+    """
+    json.dumps(record, ensure_ascii=False).encode()
+    odd = [key for key in _REQUIRED if key not in record]
+    odd += [key for key, kind in _TYPES.items() if key in record and not isinstance(record[key], kind)]
+    if odd:
+        return odd
+    entries = record["files"].values()
+    sized = all(isinstance(entry, dict) and isinstance(entry.get("bytes"), int) for entry in entries)
+    seconds = record.get("provenance", {}).get("seconds", 0.0)
+    return [
+        *(["files"] if not sized else []),
+        *(["provenance.seconds"] if not isinstance(seconds, int | float) else []),
+    ]
+
+
+def _bytes(path: Path) -> int:
+    """Computes the size of a file, or of all files below a folder; links are not followed."""
+    if path.is_symlink() or not path.is_dir():
+        return path.lstat().st_size
+    return sum(file.lstat().st_size for file in path.rglob("*") if file.is_file())
+
+
+def _remove(path: Path) -> None:
+    """Removes a folder with all that is in it, or a file or link."""
+    if path.is_symlink() or not path.is_dir():
+        path.unlink(missing_ok=True)
+    else:
+        shutil.rmtree(path, ignore_errors=True)
 
 
 def _age_s(path: Path, now: float) -> float:
@@ -229,12 +287,21 @@ def _seal(folder: Path, record: dict[str, Any]) -> None:
 
 
 def _faults(artifact: Artifact) -> list[str]:
-    """Lists the differences between an artifact's files and its record."""
-    expected, found = artifact.record["files"], digest.of_folder(artifact.folder)
+    """Lists the differences between an artifact's files and its record; sizes are compared before contents."""
+    expected = artifact.record["files"]
+    found, faults = files.listing(artifact.folder, [*expected, RECORD])
     found.pop(RECORD, None)
-    faults = [f"{name} is missing" for name in expected if name not in found]
+    faults += [f"{name} is missing" for name in expected if name not in found]
     faults += [f"{name} was added" for name in found if name not in expected]
-    return faults + [f"{name} was changed" for name in expected if name in found and expected[name] != found[name]]
+    return faults + [
+        f"{name} was changed"
+        for name, entry in expected.items()
+        if name in found and not _unchanged(artifact.folder / name, found[name], entry)
+    ]
+
+
+def _unchanged(path: Path, size: int, entry: dict[str, Any]) -> bool:
+    return size == entry["bytes"] and digest.of_file(path) == entry.get("sha256")
 
 
 def _damage(folder: Path, faults: list[str]) -> str:

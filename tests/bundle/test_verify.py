@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.bundle import checksums
-from pipeline.bundle.verify import open_bundle, verify
+from pipeline.bundle.verify import open_bundle, renamed, verify
 from pipeline.errors import DamagedError
 from pipeline.report import images
 
@@ -194,3 +195,93 @@ def test_a_damaged_bundle_is_not_opened(bundle: Path) -> None:
     (bundle / "evaluate.py").unlink()
     with pytest.raises(DamagedError, match=r"evaluate\.py is missing"):
         open_bundle(bundle)
+
+
+def test_a_renamed_folder_is_the_same_bundle(bundle: Path) -> None:
+    digest = bundle.name.rpartition("+")[2]
+    assert renamed(bundle) is None
+    for name in ("elaphe", f"copy of {bundle.name}"):
+        bundle = bundle.rename(bundle.parent / name)
+        assert verify(bundle) == []
+        assert renamed(bundle) == digest
+
+
+def test_a_manifest_that_the_sums_do_not_name_is_a_fault(bundle: Path) -> None:
+    found = verify(forged(bundle, lambda folder: (folder / "manifest.json").unlink()))
+    assert "SHA256SUMS does not name manifest.json" in found
+
+
+def setting(value: object, *keys: str | int) -> Callable[[Path], None]:
+    """Returns a function that sets one value in the manifest of a bundle."""
+
+    def damage(folder: Path) -> None:
+        path = folder / "manifest.json"
+        manifest = entry = json.loads(path.read_text(encoding="utf-8"))
+        for key in keys[:-1]:
+            entry = entry[key]
+        assert keys[-1] in entry
+        entry[keys[-1]] = value
+        path.write_text(json.dumps(manifest), encoding="utf-8")
+
+    return damage
+
+
+@pytest.mark.parametrize(
+    ("value", "keys"),
+    [
+        (0.0, ("material", "divisor")),
+        (float("nan"), ("material", "divisor")),
+        (float("nan"), ("material", "schlick_f0")),
+        (0.0, ("grid", "power")),
+        (0, ("grid", "width")),
+        (1e-320, ("grid", "u_max")),
+        ("../../../etc/passwd", ("report",)),
+        ("../../../etc/passwd", ("maps", 0, "png")),
+        ("/etc/passwd", ("tables", 0, "file")),
+    ],
+)
+def test_impossible_values_are_faults(value: object, keys: tuple[str, ...], bundle: Path) -> None:
+    faults = verify(forged(bundle, setting(value, *keys)))
+    assert any(str(keys[-1]) in fault or "expected numbers, got" in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("value", "key"),
+    [(float("nan"), "envelope_exponent"), (float("inf"), "axis_rad"), (1e-320, "r0"), (1e-320, "step")],
+)
+def test_impossible_grids_of_polar_tables_are_faults(value: float, key: str, bake: Baker, tmp_path: Path) -> None:
+    config = small("polar")
+    faults = verify(forged(publish(config, bake(config), tmp_path), setting(value, "grid", key)))
+    assert any(key in fault or "expected numbers, got" in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a": "\\ud800"}', "{", "[]"])
+def test_a_document_that_is_no_manifest_is_a_fault(text: str, bundle: Path) -> None:
+    faults = verify(forged(bundle, lambda folder: (folder / "manifest.json").write_text(text) and None))
+    assert any("manifest.json" in fault for fault in faults)
+
+
+def test_a_pipe_and_a_sparse_giant_are_not_read(bundle: Path) -> None:
+    with (bundle / FIRST["taylor"]).open("r+b") as stream:
+        stream.truncate(30 * 2**30)
+    os.mkfifo(bundle / "pipe")
+    faults = verify(bundle)
+    assert any(fault.startswith(f"{FIRST['taylor']} has {30 * 2**30} bytes") for fault in faults)
+    assert "pipe is not a plain file" in faults
+
+
+def test_pixels_are_not_decoded_where_the_header_has_another_size(
+    bundle: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A small file may hold gigabytes of zeros."""
+
+    def bomb(folder: Path) -> None:
+        pixels = np.zeros((2000, 2000, 4), np.float32)
+        images.write_rgba(folder / FIRST["taylor"], pixels)
+
+    decoded: list[Path] = []
+    decode = images.decode
+    monkeypatch.setattr(images, "decode", lambda path: decoded.append(path) or decode(path))
+    faults = verify(forged(bundle, bomb))
+    assert any("2000" in fault and FIRST["taylor"] in fault for fault in faults), faults
+    assert not any(path.name == Path(FIRST["taylor"]).name for path in decoded)

@@ -1,9 +1,11 @@
 """Changed files are named and never used, and the remedy in the message works."""
 
+import json
 from pathlib import Path
 
 import pytest
 
+from pipeline.store import digest
 from tests.cli.tool import Tool, flip_a_byte
 
 
@@ -66,6 +68,42 @@ def test_harm_to_a_record_or_to_the_list_of_files(copy: Tool, how: str) -> None:
     assert str(render) in result.errors[0]
     assert copy("store", "collect").code == 0
     assert copy("run", "small.toml").code == 0
+
+
+def test_a_file_in_the_place_of_an_artifact(copy: Tool) -> None:
+    surface = artifact(copy, "surface")
+    surface.rename(copy.folder / "moved")
+    surface.touch()
+    for command in (("run", "small.toml"), ("store", "check")):
+        result = copy(*command)
+        assert result.code == 6
+        assert [line for line in result.errors if str(surface) in line] == result.errors
+    assert copy("store", "collect").code == 0
+    assert copy("run", "small.toml", "--until", "surface").code == 0
+    assert copy("store", "check").code == 0
+
+
+@pytest.mark.parametrize(
+    ("stage", "summary"),
+    [
+        ("surface", {"warnings": 5}),
+        ("validate", {}),
+        ("bundle", {"name": 5}),
+        ("bundle", {"name": "../../elsewhere"}),
+    ],
+)
+def test_a_record_that_its_owner_sealed_with_wrong_values(copy: Tool, stage: str, summary: dict[str, object]) -> None:
+    path = artifact(copy, stage) / "artifact.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    del record["seal"]
+    record["summary"] = {**record["summary"], **summary} if summary else {}
+    record["seal"] = digest.of_json(record)
+    path.write_text(json.dumps(record), encoding="utf-8")
+    result = copy("run", "small.toml", "--out", "again")
+    assert result.code == 6
+    assert len(result.errors) == 1
+    assert str(path.parent) in result.errors[0]
+    assert not (copy.folder / "elsewhere").exists()
 
 
 @pytest.mark.parametrize("stage", ["render", "validate"])

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import DamagedError, StorageError
+from pipeline.store import digest
 from pipeline.store import store as store_module
 from pipeline.store.store import RECORD, Store
 from tests.support import killed_at
@@ -186,6 +187,36 @@ def truncate(path):
     path.write_bytes(path.read_bytes()[:-20])
 
 
+def sealed_anew(folder, **changes):
+    """Changes the record as its owner can: the seal is right."""
+    record = {**json.loads((folder / RECORD).read_text()), **changes}
+    del record["seal"]
+    record["seal"] = digest.of_json(record)
+    (folder / RECORD).write_text(json.dumps(record))
+
+
+def replaced(path, how):
+    """Puts a link with the same content, or a pipe, in the place of a file."""
+    content = path.read_bytes()
+    path.unlink()
+    if how == "pipe":
+        os.mkfifo(path)
+        return
+    (path.parent.parent / "elsewhere").write_bytes(content)
+    path.symlink_to(path.parent.parent / "elsewhere")
+
+
+def displaced(folder, how):
+    """Puts a file, a link to the same artifact, a link to nothing or a pipe at the artifact's address."""
+    moved = folder.rename(folder.with_name("moved"))
+    if how == "file":
+        folder.touch()
+    elif how == "pipe":
+        os.mkfifo(folder)
+    else:
+        folder.symlink_to(moved if how == "link" else "nowhere")
+
+
 DAMAGES = {
     "changed": (lambda f: (f / "a.txt").write_text("c0ntent"), "a.txt was changed"),
     "emptied": (lambda f: (f / "deep/b.bin").write_bytes(b""), "deep/b.bin was changed"),
@@ -199,6 +230,26 @@ DAMAGES = {
     "record a number": (lambda f: (f / RECORD).write_text("5"), f"{RECORD} cannot be read"),
     "record binary": (lambda f: (f / RECORD).write_bytes(b"\xff\x00"), f"{RECORD} cannot be read"),
     "record removed": (lambda f: (f / RECORD).unlink(), f"{RECORD} cannot be read"),
+    "record of 8 GiB": (lambda f: os.truncate(f / RECORD, 2**33), f"{RECORD} cannot be read"),
+    "record deep": (lambda f: (f / RECORD).write_text("[" * 100_000), f"{RECORD} cannot be read"),
+    "record a pipe": (lambda f: replaced(f / RECORD, "pipe"), f"{RECORD} cannot be read"),
+    "record a link": (lambda f: replaced(f / RECORD, "link"), f"{RECORD} cannot be read"),
+    "surrogate": (lambda f: sealed_anew(f, name="\ud800"), f"{RECORD} cannot be read"),
+    "files a list": (lambda f: sealed_anew(f, files=[]), f"{RECORD}: files of a wrong type"),
+    "files of numbers": (lambda f: sealed_anew(f, files={"a.txt": 7}), f"{RECORD}: files of a wrong type"),
+    "bytes a text": (lambda f: sealed_anew(f, files={"a.txt": {"bytes": "7"}}), "files of a wrong type"),
+    "summary a number": (lambda f: sealed_anew(f, summary=5), f"{RECORD}: summary of a wrong type"),
+    "stage a number": (lambda f: sealed_anew(f, stage=5), f"{RECORD}: stage of a wrong type"),
+    "seconds a text": (lambda f: sealed_anew(f, provenance={"seconds": "1"}), "provenance.seconds of a wrong type"),
+    "sparse giant": (lambda f: os.truncate(f / "a.txt", 30 * 2**30), "a.txt was changed"),
+    "link with equal content": (lambda f: replaced(f / "a.txt", "link"), "a.txt is not a plain file"),
+    "pipe": (lambda f: replaced(f / "deep/b.bin", "pipe"), "deep/b.bin is not a plain file"),
+    "pipe added": (lambda f: os.mkfifo(f / "more"), "more is not a plain file"),
+    "empty folder": (lambda f: (f / "deep/more").mkdir(), "deep/more/ was added"),
+    "file at its address": (lambda f: displaced(f, "file"), "expected a folder"),
+    "pipe at its address": (lambda f: displaced(f, "pipe"), "expected a folder"),
+    "link at its address": (lambda f: displaced(f, "link"), "expected a folder"),
+    "dangling link at its address": (lambda f: displaced(f, "dangling"), "expected a folder"),
 }
 
 
@@ -215,8 +266,9 @@ def test_damage_is_found_named_and_removed(store, damage, said):
     assert "store collect" in str(error.value)
     (line,) = store.check()
     assert line == str(error.value)
+    assert store.has("surface", K1)
     assert store.collect(keep_days=30.0)[0] == 1
-    assert not folder.exists()
+    assert not os.path.lexists(folder)
     assert sound.is_dir()
     assert store.check() == []
     make(store)

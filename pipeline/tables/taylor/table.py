@@ -102,7 +102,7 @@ def build(
     """
     _check_memory(resolution, 2 * stack.terms - 1)
     u = grid.nodes(resolution, power)
-    computed = _reachable_nodes(u, scene)
+    computed = reachable_nodes(u, scene)
     half_plane = (u > 0.0) | ((u == 0.0) & (u[:, None] >= 0.0))
     v_index, u_index = np.nonzero((computed | computed[::-1, ::-1]) & half_plane)
     nodes = np.stack([u[u_index], u[v_index]], axis=-1)
@@ -163,7 +163,7 @@ def _check_memory(resolution: int, powers: int) -> None:
         )
 
 
-def _reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
+def reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
     """Finds the nodes at the corners of the grid cells that a pair of directions reaches, bool (v, u).
 
     (u, v) lies in the disc of radius 2; under a fixed light, in the disc of radius sin(theta_max) about -wi.
