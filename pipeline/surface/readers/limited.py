@@ -156,7 +156,7 @@ def _by_child(path: Path, channel: str | None, allowed: Limits) -> Scan:
     try:
         scan = received(path.name, child.stdout, allowed)
         if scan is None:
-            raise _without_answer(path.name, child.wait(), allowed)
+            raise ended(path.name, child.wait(), allowed)
         return scan
     finally:
         child.kill()
@@ -204,8 +204,11 @@ def _filled(answer: IO[bytes], samples: NDArray[Any]) -> bool:
     return True
 
 
-def _without_answer(file: str, code: int, allowed: Limits) -> Exception:
-    """Returns the error for a child that ended, by a signal or by itself, before it answered."""
+def ended(file: str, code: int, allowed: Limits) -> Exception:
+    """Returns the error for a child that ended, by a signal or by itself, before it answered.
+
+    file: name of the scan file. code: the exit code, negative for a signal. allowed: the limits of the child.
+    """
     if code in (-signal.SIGPROF, -signal.SIGALRM):
         seconds = allowed.processor_s if code == -signal.SIGPROF else allowed.clock_s
         return fault(file, f"a scan that is read within {seconds:.3g} s", "one that takes longer", _DAMAGED)
