@@ -9,7 +9,7 @@ OUT ?= out
 
 .DEFAULT_GOAL := help
 .PHONY: help setup lock bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
-.PHONY: fuzz-bundles
+.PHONY: fuzz fuzz-bundles
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
@@ -19,6 +19,7 @@ help:
 	@echo "make test                    set up, then run linters and every test"
 	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
 	@echo "make test-avx2               run the kernels' tests and two bakes as on a processor without AVX-512"
+	@echo "make fuzz                    read 5000 mutated scans: each a reading or one line, in 5 s and 1 GB (COUNT=, SEED=)"
 	@echo "make lint                    run ruff and mypy"
 	@echo "make format                  fix and format the code with ruff"
 	@echo "make coverage                lines and branches that the fast tests run"
@@ -127,6 +128,12 @@ AVX2_TESTS := tests/diffraction tests/tables tests/accuracy tests/cli/test_devic
 test-avx2: setup
 	cache="$$(mktemp -d)" && trap 'rm -rf "$$cache"' EXIT && \
 		POCL_KERNELLIB_NAME=avx2 POCL_LLVM_CPU_NAME=haswell XDG_CACHE_HOME="$$cache" $(VENV)/bin/python -m pytest $(AVX2_TESTS)
+
+# prints the counts, and keeps mutations that did anything but be read or refused in out/fuzz
+COUNT ?= 5000
+SEED ?= 0
+fuzz: setup
+	$(VENV)/bin/python -W ignore -m tests.fuzz.scans $(COUNT) $(SEED)
 
 # lines and branches that the fast tests run; commands in child processes are not counted
 coverage: setup glslang

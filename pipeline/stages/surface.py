@@ -15,6 +15,7 @@ from pipeline.store.store import Artifact
 from pipeline.surface import recipes
 from pipeline.surface.conditioning import ConditioningRecord, condition
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.readers import require_file
 from pipeline.surface.statistics import SurfaceStatistics, measure
 
 _FILE = "surface.zarr"
@@ -29,6 +30,7 @@ _SQUARE = 0.01
 def _parameters(config: Config) -> dict[str, Any]:
     section = {**config.surface.model_dump(mode="json"), "level": config.surface.levelling}
     if config.surface.path is not None:
+        require_file(Path(config.surface.path))
         section["path"] = {"sha256": digest.of_file(Path(config.surface.path))}
     # the statistics depend on the window and the shortest wavelength
     return {

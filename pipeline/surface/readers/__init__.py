@@ -1,38 +1,5 @@
-"""Readers of scan files. `read_scan` recognises the format and calls its reader.
+"""Readers of scan files. `read_scan` reads one under limits of time and memory."""
 
-Images, arrays and text are read here, formats of microscopes by the libraries of the extra `diffract-bake[readers]`,
-which are imported only when a file needs them.
-"""
+from pipeline.surface.readers.limited import read_scan, require_file
 
-from pathlib import Path
-
-from pipeline.surface.readers import array, gsf, gwyddion, hdf5, image, nanonis, nanosurf, spm, text
-from pipeline.surface.readers.formats import BY_LIBRARY
-from pipeline.surface.readers.sniff import sniff
-from pipeline.surface.scan import Scan
-
-_READERS = {
-    "image": image.read,
-    "npy": array.read_npy,
-    "npz": array.read_npz,
-    "text": text.read,
-    "gwyddion": gwyddion.read,
-    "gsf": gsf.read,
-    "nanonis": nanonis.read,
-    "nanosurf": nanosurf.read,
-    "nhf": hdf5.read_nanosurf,
-    "h5jpk": hdf5.read_jpk,
-}
-
-
-def read_scan(path: Path, channel: str | None) -> Scan:
-    """Reads one channel of a scan file, whose format is recognised by content.
-
-    path: the file. channel: name of the channel; None takes the height channel.
-    Returns the channel as stored.
-    Raises InputError where the file cannot be opened, has an unknown format, is damaged, or lacks the channel.
-    """
-    key = sniff(path)
-    if key in BY_LIBRARY:
-        return spm.read(path, key, channel)
-    return _READERS[key](path, channel)
+__all__ = ["read_scan", "require_file"]

@@ -70,8 +70,8 @@ def fault(file: str, expected: str, found: str, way_out: str) -> InputError:
 def third_party(file: str, expected: str, library: str) -> Iterator[None]:
     """Runs a library's code without its warnings, and turns any of its exceptions into an InputError of one line.
 
-    On a damaged file, libraries raise whatever the damage leads to (struct.error, KeyError, MemoryError, ...): all
-    exceptions are therefore caught.
+    On a damaged file, libraries raise whatever the damage leads to (struct.error, KeyError, ...): all exceptions are
+    therefore caught, but a lack of memory, which `limited` explains.
 
     file: its name. expected: the format in words. library: the package's name.
     """
@@ -79,7 +79,7 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except InputError:
+    except (InputError, MemoryError):
         raise
     except ImportError as error:
         missing = error.name or library

@@ -9,12 +9,15 @@ from pipeline.surface.scan import Scan
 
 MAGIC = b"Gwyddion Simple Field 1.0\n"
 _EXPECTED = "a Gwyddion .gsf file"
+# a header has ten lines or so
+_HEADER_BYTES = 1 << 16
 _CUT = "the file may be damaged or cut short: copy or export it again"
 
 
 def read(path: Path, channel: str | None) -> Scan:
     """Reads the field; NaN is a hole. Without a unit, the size of the field gives the ratio of x to y."""
-    data = path.read_bytes()
+    with path.open("rb") as file:
+        data = file.read(_HEADER_BYTES)
     end = data.find(b"\0")
     if end < 0:
         raise fault(path.name, _EXPECTED, "no end of the header (a NUL byte)", _CUT)
@@ -28,10 +31,10 @@ def read(path: Path, channel: str | None) -> Scan:
     check_shape(path.name, (ny, nx))
     # one to four NUL bytes end the header at a multiple of four
     start = end + 4 - end % 4
-    if len(data) < start + 4 * nx * ny:
-        found = f"{len(data) - start} bytes for {ny} x {nx} samples of four"
-        raise fault(path.name, _EXPECTED, found, _CUT)
-    samples = np.frombuffer(data, "<f4", nx * ny, start).reshape(ny, nx)
+    present = path.stat().st_size - start
+    if present < 4 * nx * ny:
+        raise fault(path.name, _EXPECTED, f"{present} bytes for {ny} x {nx} samples of four", _CUT)
+    samples = np.memmap(path, "<f4", "r", start, (ny, nx))
     unit = header.get("ZUnits", "")
     if unit and micrometres(unit) is None:
         raise fault(path.name, "heights in a unit of length", f"values in {unit!r}", "export the height channel")

@@ -1,6 +1,7 @@
 """Reads Gwyddion's .gwy files, by gwyfile."""
 
 import re
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,11 @@ from pipeline.surface.readers.common import (
 )
 from pipeline.surface.scan import Scan
 
+_MAGIC = b"GWYP"
+# bytes of a component, or of one entry of an array
+_BYTES = {b"b": 1, b"c": 1, b"C": 1, b"i": 4, b"I": 4, b"q": 8, b"Q": 8, b"d": 8, b"D": 8}
+# Gwyddion nests objects four deep
+_MOST_NESTED = 32
 _DATA_KEY = re.compile(r"/(\d+)/data")
 
 
@@ -39,6 +45,9 @@ def read(path: Path, channel: str | None) -> Scan:
     with third_party(path.name, "a Gwyddion .gwy file", "gwyfile"):
         import gwyfile
 
+        data = path.read_bytes()
+        _object_end(data, len(_MAGIC), len(data))
+        del data
         fields = _height_fields(gwyfile.load(str(path)))
         names = unique_names([field.name for field in fields])
         index = pick_channel(path.name, names, channel)
@@ -57,6 +66,50 @@ def read(path: Path, channel: str | None) -> Scan:
         mask=mask,
         steps=steps,
     )
+
+
+def _object_end(data: bytes, place: int, end: int, depth: int = 0) -> int:
+    """Returns the end of the object at `place`, after a check that it and its components end before `end`.
+
+    Where a NUL is missing, gwyfile would not end. The layout is that of Gwyddion's user guide ("GWY file format").
+    Raises EOFError or struct.error where something ends too late.
+    """
+    place = _text_end(data, place, end)
+    (size,) = struct.unpack_from("<I", data, place)
+    place, last = place + 4, place + 4 + int(size)
+    if last > end or depth > _MOST_NESTED:
+        raise EOFError("an object ends after the file or the object around it")
+    while place < last:
+        place = _component_end(data, place, last, depth)
+    return last
+
+
+def _component_end(data: bytes, place: int, end: int, depth: int) -> int:
+    place = _text_end(data, place, end)
+    kind, place, count = data[place : place + 1], place + 1, 1
+    if kind.isupper():
+        (count,) = struct.unpack_from("<I", data, place)
+        place += 4
+    if kind in (b"s", b"S"):
+        for _ in range(count):
+            place = _text_end(data, place, end)
+    elif kind in (b"o", b"O"):
+        for _ in range(count):
+            place = _object_end(data, place, end, depth + 1)
+    elif kind in _BYTES:
+        place += count * _BYTES[kind]
+    else:
+        raise EOFError(f"a component has the unknown type {kind!r}")
+    if place > end:
+        raise EOFError("a component ends after its object")
+    return place
+
+
+def _text_end(data: bytes, place: int, end: int) -> int:
+    found = data.find(b"\0", place, end)
+    if found < 0:
+        raise EOFError("a name or a text does not end")
+    return found + 1
 
 
 def _height_fields(container: Any) -> list[_Field]:

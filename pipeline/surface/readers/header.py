@@ -12,6 +12,8 @@ _COMMENT_MARKS = "#;%!/'\"* \t"
 _KEY_VALUE = re.compile(r"([^:=]+)[:=](.*)")
 _PAIRS = re.compile(r"\s*(?:[A-Za-z][\w-]*\s?=\s?[^\s=]+[\s,;]*){2,}")
 _BRACKETS = re.compile(r"[(\[{]\s*(?:->|in|→)?\s*([^)\]}]*?)\s*[)\]}]")
+# a count of samples with more digits is no count, and Python refuses to convert thousands of them
+_MOST_DIGITS = 9
 _NUMBER = r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*(.*)")
 _TWO_QUANTITIES = re.compile(rf"({_NUMBER})\s*([^\d\s]*?)\s*(?:[x×*;]|\s)\s*({_NUMBER})\s*(\D*)")
@@ -177,7 +179,7 @@ def _count(entries: _Entries, keys: Sequence[str]) -> int | None:
     for key in keys:
         value = entries.values.get(key, "")
         number = value.split()[0] if value and value.split()[-1].casefold() in (*_PIXEL_UNITS, value) else ""
-        if number.isdecimal() and int(number) > 0:
+        if number.isdecimal() and len(number) <= _MOST_DIGITS and int(number) > 0:
             entries.used.add(key)
             return int(number)
     return None

@@ -1,11 +1,8 @@
 """Reads Nanonis' .sxm files, by nanonispy2."""
 
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +26,14 @@ def read(path: Path, channel: str | None) -> Scan:
     Lines that were not scanned are NaN in the file, and become holes.
     """
     with third_party(path.name, "a Nanonis .sxm file", "nanonispy2"):
-        from nanonispy2.read import Scan as NanonisScan
+        from nanonispy2 import read as nanonis
 
-        with _named_sxm(path) as named:
-            stored = NanonisScan(str(named))
+        # it takes the kind of a file from the suffix
+        with (
+            patch.object(nanonis, "_is_valid_file", lambda _, ext: ext),
+            patch.object(nanonis.Scan, "_determine_filetype", lambda _: "scan"),
+        ):
+            stored = nanonis.Scan(str(path))
         units = dict(zip(stored.header["data_info"]["Name"], stored.header["data_info"]["Unit"], strict=True))
         names = [name + suffix for name, unit in units.items() if micrometres(unit) for suffix in ("", _BACKWARD)]
         name = names[pick_channel(path.name, names, channel)]
@@ -42,18 +43,6 @@ def read(path: Path, channel: str | None) -> Scan:
         range_x, range_y = (float(metres) * 1e6 for metres in stored.header["scan_range"])
         pitch = range_x / heights.shape[1], range_y / heights.shape[0]
     return Scan(heights, um_per_unit, pitch, None, name, tuple(names), "Nanonis .sxm", library_version("nanonispy2"))
-
-
-@contextmanager
-def _named_sxm(path: Path) -> Iterator[Path]:
-    """Yields the file under a name that ends in .sxm, which nanonispy2 requires."""
-    if path.suffix == ".sxm":
-        yield path
-        return
-    with TemporaryDirectory() as folder:
-        named = Path(folder) / "scan.sxm"
-        shutil.copyfile(path, named)
-        yield named
 
 
 def _heights(path: Path, stored: Any, name: str) -> NDArray[np.float64]:
