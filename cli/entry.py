@@ -28,8 +28,8 @@ def process() -> None:
     """Runs the command in a child process and ends with its exit code, or with 128 + the number of a signal."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {*_ENDED_BY, signal.SIGCHLD})
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    # those that the caller ignores, as nohup does, are not waited for
-    awaited = {s for s in _ENDED_BY if signal.getsignal(s) is not signal.SIG_IGN}
+    # nohup ignores SIGHUP for its command; SIGINT ends the background jobs of scripts, too, for which it is ignored
+    awaited = {s for s in _ENDED_BY if s != signal.SIGHUP or signal.getsignal(s) is not signal.SIG_IGN}
     _open_standard_streams()
     # written by the command: its temporary folders, and last whether it came to its end
     notes = os.memfd_create("notes")

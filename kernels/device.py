@@ -250,7 +250,7 @@ class Program:
         if variant in self._kernels:
             self.device.run(self._kernels[variant], size, arguments)
             return
-        self._kernels[variant] = getattr(self._program, kernel)
+        self._kernels[variant] = _opencl().Kernel(self._program, kernel)
         # PoCL finishes compiling at the first launch
         with kernel_cache().compiling(f"{variant} {self._identity}"):
             self.device.run(self._kernels[variant], size, arguments)

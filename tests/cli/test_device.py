@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
+import numpy as np
 import pyopencl
 import pytest
 
@@ -82,6 +83,18 @@ def test_errors_of_the_compiler_come_through() -> None:
     broken = mock.patch.object(source, "text", return_value="__kernel void broken() { undeclared = 1; }")
     with broken, pytest.raises(pyopencl.Error, match="undeclared"):
         device.Program(("broken.cl",), {})
+
+
+def test_a_kernel_runs_on_narrow_and_wide_grids() -> None:
+    """PoCL compiles it for each of them, and pyopencl would warn if its kernel were looked up twice by name."""
+    text = "__kernel void count(__global int *x) { x[get_global_id(0)] = get_global_id(0); }"
+    with mock.patch.object(source, "text", return_value=text):
+        program = device.Program(("count.cl",), {})
+    for items in (10, 2**16, 20):
+        found = np.zeros(items, np.int32)
+        buffer = device.result_buffer(found.nbytes)
+        program.launch("count", (items, 1), buffer)
+        assert np.array_equal(device.download(buffer, found), np.arange(items))
 
 
 @dataclass(frozen=True)

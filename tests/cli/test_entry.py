@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.tool import COMMAND, REPOSITORY, Tool
+from tests.cli.tool import REPOSITORY, Tool
 
 # takes the place of the command: prints a line, and then does what a test asks for
 _COMMAND = """
@@ -70,14 +70,18 @@ def test_a_killed_supervisor_takes_the_command_with_it() -> None:
         process.communicate(timeout=2.0)
 
 
-def test_a_signal_that_the_caller_ignores_is_ignored() -> None:
-    def ignore() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    with subprocess.Popen([COMMAND, "--help"], stdout=subprocess.PIPE, preexec_fn=ignore) as process:
-        process.send_signal(signal.SIGINT)
+@pytest.mark.parametrize("sent", [signal.SIGHUP, signal.SIGINT])
+def test_signals_that_the_caller_ignores(sent: signal.Signals) -> None:
+    """As nohup and the background jobs of scripts do: the terminal's end is ignored, an interrupt is not."""
+    before = signal.signal(sent, signal.SIG_IGN)
+    try:
+        process = start("threading.Event().wait(1)")
+    finally:
+        signal.signal(sent, before)
+    with process:
+        process.send_signal(sent)
         process.communicate(timeout=20)
-    assert process.returncode == 0
+    assert process.returncode == (0 if sent == signal.SIGHUP else 130)
 
 
 @pytest.mark.parametrize(
