@@ -74,9 +74,12 @@ def speckle_contrast(power: PolarPowerSpectrum) -> float:
     """Computes the variance of E relative to its squared local mean.
 
     It is 1 for fully developed speckle, and 1 / n for the mean over n independent windows. It is taken over azimuths
-    at the middle node in s, and is the median over the radii beyond the specular lobe.
+    at the middle node in s, and is the median over the radii beyond the specular lobe; 0 where a narrow cone of views
+    has none.
     """
     tiles, radii, nodes, lanes = power.values.shape
+    if radii - _SPARE_RADII <= radii // 4:
+        return 0.0
     e = np.moveaxis(power.values[:, radii // 4 : -_SPARE_RADII, nodes // 2], 2, 1).reshape(tiles * lanes, -1)
     kernel = np.ones(min(_CONTRAST_AZIMUTHS, len(e)))
     kernel /= len(kernel)

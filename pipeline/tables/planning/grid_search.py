@@ -134,7 +134,8 @@ class GridSearch:
                 best = self._clipped(_GROWTH * before[0], _GROWTH * before[1])
             if _NEAR * target <= error(*best) <= target:
                 break
-            left *= min(4.0, (0.9 * target / error(*best)) ** 2)
+            # no error at all, where every test direction saturates or is black, asks for the coarsest grid
+            left *= min(2.0, 0.9 * target / max(error(*best), 1e-9 * target)) ** 2
         # numbers that the config sets were varied for the model only
         allowed = {pair: errors[pair] for pair in errors if pair == self._clipped(*pair)}
         met = [pair for pair in allowed if allowed[pair] <= target]
