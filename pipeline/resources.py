@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import ResourceError
@@ -18,12 +18,12 @@ from pipeline.errors import ResourceError
 Arrays = dict[str, int]
 
 MIB = 2**20
-# measured with Python 3.11 and PoCL 3.1 on two cores: an interpreter that has imported the stages, and what threads,
-# heaps and libraries reserve of the address space without using it, which grows with the number of cores
-INTERPRETER_BYTES = 240 * MIB
+# measured with Python 3.11 and PoCL 3.1 on two cores: what threads, heaps and libraries reserve of the address space
+# without using it, which grows with the number of cores
 _RESERVED_BYTES, _RESERVED_BYTES_A_CORE = 900 * MIB, 150 * MIB
-# multiply-adds per second and core in single precision, as the spectral operator does on the machine above
-MULTIPLY_ADDS_PER_S = 2e9
+# multiply-adds per second and core in single precision: a third of what the kernels reach with AVX2. Estimates are
+# right within a factor of some three
+MULTIPLY_ADDS_PER_S = 8e9
 # a bake of a snake takes seconds and one of a scan of 4096 x 4096 samples a minute: what takes longer than this has a
 # unit wrong
 LONGEST_S = 3600.0
@@ -39,10 +39,12 @@ class Need:
     """The resources of a step.
 
     arrays: bytes at its peak, by name. seconds: estimate of its time on this machine, s.
+    buffer: bytes of the largest array that a device holds in one piece.
     """
 
     arrays: Mapping[str, int]
     seconds: float = 0.0
+    buffer: int = 0
 
     @property
     def bytes(self) -> int:
@@ -60,7 +62,8 @@ class Limit:
 
 def largest(*phases: Mapping[str, int]) -> Arrays:
     """Returns the arrays of the phase that needs most; arrays of different phases do not exist at the same time."""
-    return dict(max(phases, key=lambda arrays: sum(arrays.values())))
+    biggest: Mapping[str, int] = max(phases, key=lambda arrays: sum(arrays.values()))
+    return dict(biggest)
 
 
 def seconds(multiply_adds: float) -> float:
@@ -111,7 +114,7 @@ def available() -> Limit:
     free = _field("/proc/meminfo", "MemAvailable")
     if free is not None:
         found.append(Limit(held + free, "the memory that this machine has left"))
-    found += [Limit(held + free, "the memory that the control group has left") for free in _left_in_groups()]
+    found += [Limit(held + free, "the memory that the control group has left") for free in left_in_groups()]
     found += _address_space()
     return min(found, key=lambda limit: limit.bytes)
 
@@ -144,8 +147,11 @@ def _field(file: str, name: str) -> int | None:
     return None if found is None else 1024 * int(found[1])
 
 
-def _left_in_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> list[int]:
-    """Lists the bytes left in the process's control group and in all above it, of version 2 and of version 1."""
+def left_in_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> list[int]:
+    """Lists the bytes left in the process's control group and in all above it, of version 2 and of version 1.
+
+    root: where control groups are mounted. own: the file that names those of the process.
+    """
     try:
         entries = [line.split(":", 2) for line in own.read_text(encoding="utf-8").splitlines()]
     except OSError:
@@ -188,8 +194,3 @@ def _address_space() -> list[Limit]:
         return []
     reserved = _RESERVED_BYTES + _RESERVED_BYTES_A_CORE * (os.cpu_count() or 1)
     return [Limit(max(0, most - reserved), "the address space (ulimit -v), less what libraries reserve")]
-
-
-def with_arrays(need: Need, **arrays: int) -> Need:
-    """Returns a need with more arrays."""
-    return replace(need, arrays={**need.arrays, **arrays})

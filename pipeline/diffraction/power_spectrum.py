@@ -89,6 +89,16 @@ def speckle_contrast(power: PolarPowerSpectrum) -> float:
     return float(np.median(np.mean((e / local - 1.0) ** 2, axis=0)))
 
 
+def power_spectrum_bytes(azimuths: int, radii: int, nodes: int) -> int:
+    """Computes the size of E, bytes."""
+    return 4 * azimuths * radii * nodes
+
+
+def contrast_bytes(azimuths: int, radii: int) -> int:
+    """Computes the memory in which `speckle_contrast` works, bytes: E of one node, and its transforms and means."""
+    return (3 * 8 + 3 * 4) * azimuths * (radii - radii // 4)
+
+
 def s_nodes(count: int, s_max_per_um: float) -> Array:
     """Computes `count` Chebyshev nodes (count,) on [0, s_max], 1/um."""
     return np.asarray(0.5 * s_max_per_um * (1.0 + chebyshev(count)[1]))
@@ -126,9 +136,14 @@ def chebyshev_stack(
     tolerance: amplitude, relative to its peak, at which the window's transform is cut.
     Returns the stack. Raises AccuracyError and DeviceError as `dft_stack.build` does.
     """
-    filled = polar_power_spectrum.LANES * ceil(terms / polar_power_spectrum.LANES)
+    filled = filled_terms(terms)
     built = dft_stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
     return replace(built, terms=terms)
+
+
+def filled_terms(terms: int) -> int:
+    """Computes the length of the last axis of such a stack."""
+    return polar_power_spectrum.LANES * ceil(terms / polar_power_spectrum.LANES)
 
 
 def s_max(lambda_min_nm: float) -> float:
