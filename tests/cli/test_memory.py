@@ -11,6 +11,7 @@ from pipeline.config import read
 from pipeline.errors import ResourceError
 from pipeline.stages import forecast
 from tests.cli import measured
+from tests.cli.test_plan import STAGES
 from tests.cli.tool import Tool, recipe
 from tests.support import shared_file
 
@@ -113,7 +114,7 @@ def test_what_is_cached_needs_nothing(baked: Tool) -> None:
 def test_plan_prints_the_peak_of_each_stage(tool: Tool) -> None:
     result = tool("plan", tool.config(), "--json")
     steps = result.json["small"]
-    assert [step["stage"] for step in steps] == ["surface", "stack", "table", "render", "validate", "bundle"]
+    assert [step["stage"] for step in steps] == STAGES
     assert all(2**27 < step["peak_bytes"] < 2**30 and 0 <= step["seconds"] < 60 for step in steps)
     assert "MiB" in tool("plan", "small.toml").stdout
 
