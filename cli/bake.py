@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 )
 @console.out_option
 @console.store_option
+@console.memory_option
 @console.json_option
 def run_command(
     config_paths: tuple[Path, ...], until: str | None, out: Path, store_root: Path | None, as_json: bool
@@ -137,9 +138,14 @@ def _print_result(result: dict[str, Any]) -> None:
 @click.command("plan")
 @click.argument("config_paths", metavar="CONFIG...", type=click.Path(path_type=Path), nargs=-1, required=True)
 @console.store_option
+@console.memory_option
 @console.json_option
 def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_json: bool) -> None:
-    """List what `run` would do: each stage, cached or to do, the reason, and its cost. Computes nothing."""
+    """List what `run` would do: each stage, cached or to do, the reason, its memory and its cost. Computes nothing.
+
+    The peak is that of the whole process. With a limit, a stage that exceeds it is refused as `run` refuses it. What
+    a scan needs is known once `run --until surface` has read it.
+    """
     store = console.open_store(store_root)
     plans = {config.name: _plan(config, store) for config in load_all(config_paths)}
     if as_json:
@@ -147,13 +153,20 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
         return
     for name, steps in plans.items():
         console.say(f"{name}:")
-        console.print_table(["stage", "state", "cost"], [[s["stage"], s["state"], s["cost"]] for s in steps])
+        rows = [[s["stage"], s["state"], _size(s["peak_bytes"]), s["cost"]] for s in steps]
+        console.print_table(["stage", "state", "peak", "cost"], rows)
         for step in steps:
             if step["state"] == "to do":
                 console.say(f"{step['stage']}: {step['reason']}")
 
 
-def _plan(config: "Config", store: Any) -> list[dict[str, str]]:
+def _size(bytes_: int | None) -> str:
+    from pipeline.resources import in_words
+
+    return "unknown" if bytes_ is None else in_words(bytes_)
+
+
+def _plan(config: "Config", store: Any) -> list[dict[str, Any]]:
     """Lists every stage."""
     from pipeline.stages import run
 
@@ -165,6 +178,8 @@ def _plan(config: "Config", store: Any) -> list[dict[str, str]]:
             "state": "cached" if step.cached else "to do",
             "reason": explanation.reason,
             "cost": explanation.cost,
+            "peak_bytes": None if explanation.need is None else explanation.need.bytes,
+            "seconds": None if explanation.need is None else explanation.need.seconds,
         }
         for step, explanation in zip(steps, run.explain(config, steps, store), strict=True)
     ]

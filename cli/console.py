@@ -54,6 +54,28 @@ def store_option(command: Callable[..., Any]) -> Callable[..., Any]:
     )(command)
 
 
+def memory_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds --memory to a command: the limit of what stages are predicted to need while the command runs."""
+    return click.option(
+        "--memory",
+        metavar="SIZE",
+        callback=_allow_memory,
+        expose_value=False,
+        help="Refuse stages that need more, as 4GiB [default: what the machine has left].",
+    )(command)
+
+
+def _allow_memory(context: click.Context, parameter: click.Parameter, text: str | None) -> None:
+    if text is None:
+        return
+    from pipeline import resources
+
+    try:
+        context.with_resource(resources.allowing(resources.bytes_of(text)))
+    except ValueError as error:
+        raise click.BadParameter(str(error), context, parameter) from None
+
+
 def json_option(command: Callable[..., Any]) -> Callable[..., Any]:
     """Adds --json to a command."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines.")(command)

@@ -23,6 +23,7 @@ from cli import console, sources
     help='In nm, as 450,550,650: print |P|^2 at each instead of X,Y,Z (configs whose table.form is "spectral").',
 )
 @console.store_option
+@console.memory_option
 @console.json_option
 def eval_command(
     source: Path, directions: Path, exact: bool, wavelengths: str | None, store_root: Path | None, as_json: bool

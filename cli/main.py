@@ -55,7 +55,7 @@ def cli() -> None:
       diffract-bake run configs/elaphe.toml   or a synthetic snake skin
 
     Results go to stdout, progress to stderr. Exit codes: 0 done, 1 internal fault, 2 usage or config, 3 input file,
-    4 accuracy out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted,
+    4 accuracy or memory out of reach, 5 no device, 6 damaged store or bundle, 7 cannot write, 130 interrupted,
     143 terminated.
     """
 
@@ -81,6 +81,8 @@ def main() -> None:
         sys.exit(error.exit_code)
     except OSError as error:
         sys.exit(_output_refused(error))
+    except MemoryError as error:
+        sys.exit(_out_of_memory(error))
     except Exception as error:
         sys.exit(_internal_fault(error))
 
@@ -101,6 +103,18 @@ def _output_refused(error: OSError) -> int:
         return 0
     console.note("error: stdout: no space left to write")
     return StorageError.exit_code
+
+
+def _out_of_memory(error: MemoryError) -> int:
+    """Returns the exit code where memory ran out, in spite of the prediction or outside of a bake."""
+    from pipeline.errors import ResourceError
+
+    text = " ".join(str(error).split()) or "no more can be had"
+    console.note(
+        f"error: out of memory: {text}; free some, or use smaller settings: `diffract-bake plan` shows what each "
+        "stage needs"
+    )
+    return ResourceError.exit_code
 
 
 def _internal_fault(error: Exception) -> int:

@@ -11,6 +11,7 @@ from cli import console, sources
 @click.argument("config_path", metavar="CONFIG", type=click.Path(path_type=Path))
 @console.out_option
 @console.store_option
+@console.memory_option
 @console.json_option
 def publish_command(config_path: Path, out: Path, store_root: Path | None, as_json: bool) -> None:
     """Write the bundle of CONFIG to OUT/NAME/NAME-VERSION+DIGEST, and bake what is missing.

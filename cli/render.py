@@ -16,6 +16,7 @@ from cli import console, sources
 @click.option("--exact", is_flag=True, help="Use the exact reference instead of the table.")
 @console.out_option
 @console.store_option
+@console.memory_option
 @console.json_option
 def render_command(
     config_path: Path,

@@ -12,6 +12,7 @@ from cli.bake import bake_all
 @click.argument("config_paths", metavar="CONFIG...", type=click.Path(path_type=Path), nargs=-1, required=True)
 @console.out_option
 @console.store_option
+@console.memory_option
 @console.json_option
 def validate_command(config_paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool) -> None:
     """Measure CONFIGs' tables against the exact sum and write OUT/NAME/report.html.

@@ -138,7 +138,7 @@ class Device:
     """The device in use, its context and its in-order queue, with what belongs to it.
 
     vector_width: floats of a vector register that its compiler builds for.
-    shares_memory: whether its memory is the process's.
+    largest_bytes: of one buffer. shares_memory: whether its memory is the process's.
     memory: of arrays that its kernels read and write. blocks: constants that its kernels are compiled with.
     """
 
@@ -146,6 +146,7 @@ class Device:
     driver: str
     compute_units: int
     vector_width: int
+    largest_bytes: int
     shares_memory: bool
     context: Any
     queue: Any
@@ -184,8 +185,8 @@ def default_device() -> Device:
         if not probe.fault:
             queue = _opencl().CommandQueue(probe.context)
             shares = bool(queue.device.host_unified_memory)
-            width = probe.vector_width
-            return Device(probe.device, probe.driver, probe.compute_units, width, shares, probe.context, queue)
+            sizes = probe.vector_width, queue.device.max_mem_alloc_size
+            return Device(probe.device, probe.driver, probe.compute_units, *sizes, shares, probe.context, queue)
     tried = "; ".join(f"{probe.device}: {probe.fault}" for probe in probes)
     raise NoDeviceError(_why_none(wanted, [device.name.strip() for _, device in listed], tried))
 
@@ -260,7 +261,7 @@ def upload(array: np.ndarray) -> Any:
     """A read-only device buffer with the array's bytes; hold it until the kernel has run."""
     cl = _opencl()
     flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-    return cl.Buffer(default_device().context, flags, hostbuf=np.ascontiguousarray(array))
+    return _buffer(flags, hostbuf=np.ascontiguousarray(array))
 
 
 def result_buffer(nbytes: int) -> Any:
@@ -268,7 +269,7 @@ def result_buffer(nbytes: int) -> Any:
     cl, used = _opencl(), default_device()
     if used.shares_memory:
         return shared(empty((nbytes,), np.uint8))
-    return cl.Buffer(used.context, cl.mem_flags.READ_WRITE, nbytes)
+    return _buffer(cl.mem_flags.READ_WRITE, size=nbytes)
 
 
 def download(buffer: Any, out: np.ndarray) -> np.ndarray:
@@ -285,7 +286,19 @@ def empty(shape: tuple[int, ...], dtype: Any) -> np.ndarray:
 def shared(array: np.ndarray) -> Any:
     """A device buffer in the array's own memory where the device shares it; `settle` it before reading the array."""
     cl = _opencl()
-    return cl.Buffer(default_device().context, cl.mem_flags.READ_WRITE | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
+    return _buffer(cl.mem_flags.READ_WRITE | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
+
+
+def _buffer(flags: Any, **keys: Any) -> Any:
+    """A device buffer. Raises MemoryError where the device has none to give, or not as much in one buffer."""
+    cl, used = _opencl(), default_device()
+    try:
+        return cl.Buffer(used.context, flags, **keys)
+    except cl.Error as error:
+        nbytes = keys["hostbuf"].nbytes if "hostbuf" in keys else keys["size"]
+        if isinstance(error, cl.MemoryError) or nbytes > used.largest_bytes:
+            raise MemoryError(f"{used.name} cannot hold a buffer of {nbytes / 2**20:.0f} MiB") from None
+        raise
 
 
 def lent(array: np.ndarray) -> Any:

@@ -29,6 +29,11 @@ class Kept:
         return 2 * self.psi_max + 1, self.reach + self.phi_max + 1
 
 
+def between_bytes(kept: Kept, rows: int) -> int:
+    """Bytes of what `transform` of `rows` rows holds between its steps: a vector of terms, real and imaginary."""
+    return 2 * _VECTOR_BYTES * (max(kept.phi_max, kept.reach) + 1) * rows
+
+
 def transform(
     heights_um: NDArray[np.float64],
     scale_per_um: float,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 LINE = 64  # bytes of a cache line, and of a vector
-_MOST_SPARE_BYTES = 2**28
+MOST_SPARE_BYTES = 2**28
 
 
 class MemoryPool:
@@ -23,7 +23,7 @@ class MemoryPool:
         Its memory returns to the pool once nothing refers to it.
         """
         bytes_ = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-        raw = np.asarray(_Pages(self, bytes_ + LINE))
+        raw = np.asarray(_Pages(self, self.take(bytes_ + LINE), bytes_ + LINE))
         first = -raw.ctypes.data % LINE
         array: np.ndarray = raw[first : first + bytes_].view(dtype).reshape(shape)
         return array
@@ -39,15 +39,16 @@ class MemoryPool:
         """Keep memory for later; the oldest goes where the pool holds too much."""
         with self._lock:
             self._spare.append(memory)
-            while sum(spare.nbytes for spare in self._spare) > _MOST_SPARE_BYTES:
+            while sum(spare.nbytes for spare in self._spare) > MOST_SPARE_BYTES:
                 self._spare.pop(0)
 
 
 class _Pages:
     """A part of the pool's memory, held until the last array on it is gone."""
 
-    def __init__(self, pool: MemoryPool, bytes_: int) -> None:
-        self._pool, self._memory = pool, pool.take(bytes_)
+    def __init__(self, pool: MemoryPool, memory: np.ndarray, bytes_: int) -> None:
+        # `memory` is taken before: an object whose memory could not be had would still be deleted
+        self._pool, self._memory = pool, memory
         self.__array_interface__ = {**self._memory.__array_interface__, "shape": (bytes_,)}
 
     def __del__(self) -> None:

@@ -118,12 +118,19 @@ def _operator(
         )
     ]
     count, ring_points = len(points.place), int(points.rings @ points.count)
-    # lagrange_r, cardinal_s and point_weights in float; used, two int of each ring
-    numbers = count * ORDER, count * s_nodes * w_terms, ring_points * CHANNELS * w_terms, 2 * len(rho)
+    numbers = operator_numbers(count, ring_points, len(rho), s_nodes, w_terms)
     weights = [device.result_buffer(4 * n) for n in numbers]
     sizes = np.float32(s_max_per_um), np.int32(s_nodes), np.int32(w_terms)
     program.launch("build_operator", (len(points.rings),), *where, *inputs, *sizes, *weights)
     return program, [*where, *weights]
+
+
+def operator_numbers(points: int, ring_points: int, rings: int, s_nodes: int, w_terms: int) -> tuple[int, ...]:
+    """Sizes of the operator's arrays: lagrange_r, cardinal_s and point_weights in float; used, two int of each ring.
+
+    points: of all groups. ring_points: of the rings, each with all those of its group.
+    """
+    return points * ORDER, points * s_nodes * w_terms, ring_points * CHANNELS * w_terms, 2 * rings
 
 
 def _groups(points: LinePoints) -> np.ndarray:

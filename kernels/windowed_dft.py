@@ -141,7 +141,7 @@ def exact_power(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> n
     lines, groups = len(first) - 1, -(-len(lambda_um) // _WAVELENGTHS)
     padded = np.pad(lambda_um, (0, groups * _WAVELENGTHS - len(lambda_um)), mode="edge")
     items = min(lines * groups, _ITEMS_A_UNIT * device.default_device().compute_units)
-    scratch = _WAVELENGTHS * (2 * stack.reach[0] + 1 + 3) * 2 * LANES * stack.blocks
+    scratch = _scratch(stack.reach[0], stack.blocks)
     read = [device.upload(a) for a in (first, directions, place, padded)]
     out = device.empty((len(uvw), groups * _WAVELENGTHS), np.float64)
     result = device.shared(out)
@@ -159,6 +159,23 @@ def exact_power(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> n
         result,
     )
     return device.settle(result, out)[:, : len(lambda_um)]
+
+
+def _scratch(reach_x: int, blocks: int) -> int:
+    """Doubles that a work-item of the power spectrum holds."""
+    return _WAVELENGTHS * (2 * reach_x + 1 + 3) * 2 * LANES * blocks
+
+
+def exact_power_bytes(directions: int, wavelengths: int, reach_x: int, terms: int, units: int) -> int:
+    """Bytes of `exact_power`: its result and the scratch of its work-items on a device of so many compute units."""
+    return 8 * (
+        directions * (wavelengths + _WAVELENGTHS) + _ITEMS_A_UNIT * units * _scratch(reach_x, -(-terms // LANES))
+    )
+
+
+def taylor_table_bytes(nodes: int, terms: int) -> int:
+    """Bytes of `taylor_table`: the nodes on the device, and a tile of results there and here."""
+    return 16 * nodes + 2 * 8 * _TILE * 3 * 2 * LANES * -(-terms // LANES)
 
 
 def _taylor_series(lambda_um: np.ndarray, stack: DeviceStack) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipeline import resources
 from pipeline.config import read
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, InputError
@@ -73,6 +74,7 @@ def bake(
     *,
     out: str | Path = "out",
     store: str | Path | None = None,
+    memory: int | str | None = None,
     progress: Progress = silent,
 ) -> Baked:
     """Runs all stages of a config, as `diffract-bake run` does: surface, table, maps, validation, bundle.
@@ -82,12 +84,14 @@ def bake(
     out: folder for results, which land in out/NAME.
     store: folder of cached artifacts, by default $DIFFRACT_BAKE_STORE or the user's cache folder. A stage is computed
         again only where its inputs have changed.
+    memory: the most memory that a stage may need, bytes or a text like "4GiB", by default what the machine has left.
     progress: called with the name of a step and its completed share, 0 to 1.
 
     Returns the paths of the results and the measured errors.
 
     Raises a class of pipeline.errors: ConfigError with every fault; InputError for a scan that cannot be trusted;
     AccuracyError for an error budget out of reach, or one that the maps miss (the results are written nevertheless);
+    ResourceError for a stage that needs more memory than is allowed;
     DeviceError without a working OpenCL device; DamagedError for a damaged artifact; StorageError where a file cannot
     be written.
     """
@@ -107,7 +111,8 @@ def bake(
     folder = Path(out) / config.name
     scratch.require_folder(folder)
     opened = Store(users_folder() if store is None else Path(store))
-    made, bundle = baking.make(config, opened, folder, progress)
+    with resources.allowing(resources.bytes_of(memory) if isinstance(memory, str) else memory):
+        made, bundle = baking.make(config, opened, folder, progress)
     if made.missed_budget is not None:
         raise AccuracyError(made.missed_budget)
     *maps, report = made.files

@@ -45,6 +45,12 @@ class AccuracyError(BakeError):
     exit_code = 4
 
 
+class ResourceError(BakeError):
+    """The work needs more memory than it may take."""
+
+    exit_code = 4
+
+
 class DeviceError(BakeError):
     """No OpenCL device can compile and run a kernel."""
 

@@ -7,9 +7,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo
 
 # not strict, because TOML has arrays and no tuples
 Pair = Annotated[tuple[float, float], Field(strict=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# beyond these limits a unit is wrong; within them, no product of some of them overflows or vanishes
+Positive = Annotated[float, Field(ge=1e-12, le=1e12)]
 PositivePair = Annotated[tuple[Positive, Positive], Field(strict=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+# a length on a surface, um, from an atom's to a hand's: what lies beyond is given in a wrong unit
+Length = Annotated[float, Field(ge=1e-4, le=1e5)]
+LengthPair = Annotated[tuple[Length, Length], Field(strict=False)]
+# an exposure, RU: 1 saturates a mirror, and the darkest surface that float32 holds is seen at the other end
+Exposure = Annotated[float, Field(ge=1e-6, le=1e12)]
+# an azimuth, degrees: some turns
+Azimuth = Annotated[float, Field(ge=-3600, le=3600)]
 
 
 class Validated(BaseModel):

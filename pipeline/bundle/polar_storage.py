@@ -12,13 +12,21 @@ from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, RandomChec
 from pipeline.arrays import Array
 from pipeline.bundle import half
 from pipeline.bundle.manifest import PolarLoss
-from pipeline.config.models import Config
+from pipeline.config.models import Config, Publish
 from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.tables.evaluate import interpolator, table_evaluator
-from pipeline.tables.polar.compression import Textures, compress, flattened, most_textures, whole
+from pipeline.tables.polar.compression import (
+    CHANNELS,
+    Textures,
+    compress,
+    flattened,
+    most_textures,
+    weighting_bytes,
+    whole,
+)
 from pipeline.tables.polar.table import PolarTable
 
 _SEED = 20160816
@@ -98,6 +106,18 @@ def choose(config: Config, table: PolarTable, reference: MeanReference) -> tuple
     _refuse_missed_budget(config, loss, mean_error(random, config))
     refuse_clamping(random, config)
     return last, loss, random
+
+
+def choosing_bytes(table_bytes: int, w_terms: int, publish: Publish) -> int:
+    """Computes the memory in which `choose` works, bytes.
+
+    There are, at most in the size of the table, the compressed textures, their samples with three temporaries, the
+    flattened coefficients, the stored values and those read back, and the table that is reconstructed; and the
+    Chebyshev polynomials of the directions that weight them.
+    """
+    most = 3 * w_terms // CHANNELS
+    share = 1.0 if isinstance(publish.textures, str) else min(publish.textures, most) / most
+    return round((7.0 * share + 1.0) * table_bytes) + weighting_bytes(w_terms)
 
 
 def _candidates(asked: str | int, most: int) -> Iterable[int]:

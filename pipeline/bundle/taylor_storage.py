@@ -50,6 +50,19 @@ def planes(table: TaylorTable, scale: Array, precision: str) -> Iterator[NDArray
             yield rgba
 
 
+def planes_bytes(resolution: int) -> int:
+    """Computes the memory of `planes`, bytes: those that are gathered at a time, and an image in three forms."""
+    return resolution**2 * (3 * 4 * _PLANES_AT_ONCE + 3 * 16)
+
+
+def measuring_bytes(table_bytes: int) -> int:
+    """Computes the memory in which `measure` works, bytes.
+
+    The table as it is read back, and the table scaled, in half floats and back again.
+    """
+    return round(4.5 * table_bytes)
+
+
 def subnormal_shares(table: TaylorTable, scale: Array) -> Array:
     """Computes the share of values of each p (P,) that half floats store with fewer than 11 bits, or as 0."""
     stored = table.values[table.computed] / scale.astype(np.float32)

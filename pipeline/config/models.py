@@ -17,7 +17,7 @@ from pipeline.optics.material import Material
 from pipeline.optics.scene import Direction, Lights, Scene
 from pipeline.surface.source import SurfaceSource
 from pipeline.tables.polar.layout import PolarLayout
-from pipeline.validated import Positive, Validated
+from pipeline.validated import Exposure, Validated
 
 # the mean CIELAB error for which polar tables are planned where the config sets no budget
 DEFAULT_DELTA_E = 0.1
@@ -31,7 +31,7 @@ class Accuracy(Validated):
     """
 
     delta_e: Annotated[float, Field(ge=1e-3, le=100)] | None = None
-    exposure_ru: Positive = 7500.0
+    exposure_ru: Exposure = 7500.0
 
 
 class Render(Validated):
@@ -42,7 +42,7 @@ class Render(Validated):
 
     size: Annotated[int, Field(ge=16, le=4096)] = 512
     lights: Lights = Field(default_factory=lambda: [Direction(theta_deg=0.0)])
-    exposure_ru: Positive = 1500.0
+    exposure_ru: Exposure = 1500.0
 
 
 class Publish(Validated):

@@ -17,17 +17,18 @@ from scipy.fft import next_fast_len
 
 from kernels import device, dft_stack
 from kernels.dft_stack import Kept
+from pipeline import resources
 from pipeline.diffraction.device import require_device
 from pipeline.errors import AccuracyError
 from pipeline.fourier import term_transforms
 from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
 from pipeline.progress import Progress, silent
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 
 Basis = Literal["taylor", "chebyshev"]
 # the sum over samples then differs from the window's integral by 1e-12 of it
 LEAST_SIGMA_PITCHES = 1.2
-_MOST_BYTES = 6 * 2**30
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,60 @@ class Stack:
     band_per_um: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class StackSize:
+    """The size of a stack, known before it is built: samples that are transformed, coefficients that are kept.
+
+    samples: (ny, nx) within 8.5 sigma of the middle. kept: indices of the coefficients.
+    spacing_per_um, reach: as in `Stack`.
+    """
+
+    samples: tuple[int, int]
+    kept: Kept
+    spacing_per_um: tuple[float, float]
+    reach: tuple[int, int]
+
+    def stack_bytes(self, terms: int, itemsize: int) -> int:
+        """Computes the size of the stack of so many terms, bytes."""
+        rows, columns = self.kept.shape
+        return 2 * rows * columns * terms * itemsize
+
+    def chebyshev_bytes(self, terms: int, itemsize: int) -> resources.Arrays:
+        """Lists the arrays of `build` for a Chebyshev stack.
+
+        These are the centred heights and the device's copy, the terms between the kernel's two steps, and the stack.
+        """
+        ny, nx = self.samples
+        return {
+            "centred heights, twice": 2 * 8 * ny * nx,
+            "terms between two transforms": dft_stack.between_bytes(self.kept, ny),
+            "stack": self.stack_bytes(terms, itemsize),
+        }
+
+    def taylor_bytes(self, terms: int) -> resources.Arrays:
+        """Lists the arrays of `build` for a Taylor stack.
+
+        These are the centred heights, t, its power and a copy with another origin, FFTW's plans, and the stack.
+        """
+        return {
+            "heights and their powers": 4 * 8 * self.samples[0] * self.samples[1],
+            "FFTW's plans": term_transforms.plans_bytes(self.samples, self.kept, terms, np.dtype(np.float64)),
+            "stack": self.stack_bytes(terms, 8),
+        }
+
+
+def size(extent: Extent, sigma_um: float, frequency_max_per_um: float, tolerance: float) -> StackSize:
+    """Chooses the samples and the coefficients of a stack; the parameters are those of `build`."""
+    samples = _kept_samples(extent, sigma_um)
+    spacing = 1.0 / (samples[1] * extent.pitch_um[0]), 1.0 / (samples[0] * extent.pitch_um[1])
+    reach = window_reach(spacing, sigma_um, tolerance)
+    phi_max, psi_max = (
+        floor(min(frequency_max_per_um, 0.5 / pitch) / d + 0.5) + r
+        for pitch, d, r in zip(extent.pitch_um, spacing, reach, strict=True)
+    )
+    return StackSize(samples, Kept(psi_max, phi_max, reach[0]), spacing, reach)
+
+
 def build(
     field: HeightField,
     basis: Basis,
@@ -76,25 +131,34 @@ def build(
     frequency_max_per_um: highest |f| of interest, 1/um; frequencies above the Nyquist limits are omitted in any case.
     tolerance: amplitude, relative to its peak, at which the window's transform is cut.
     progress: called with the share done. dtype: float32 or float64.
-    Returns the stack. Raises AccuracyError if the samples do not resolve the window or the stack does not fit into
-    memory, and DeviceError if a Chebyshev stack is asked for and no device works.
+    Returns the stack. Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does
+    not fit into memory, and DeviceError if a Chebyshev stack is asked for and no device works.
     """
     _check_window(sigma_um, field.pitch_um)
     # centred after the crop, because the mid-range of the part may differ from that of the whole patch
+    chosen = size(field.extent, sigma_um, frequency_max_per_um, tolerance)
+    kept, reach = chosen.kept, chosen.reach
     field = crop_to_window(field, sigma_um).centred()
-    width, height = field.size_um
-    spacing = (1.0 / width, 1.0 / height)
-    reach = window_reach(spacing, sigma_um, tolerance)
-    band = field.band_limit_per_um
-    phi_max, psi_max = (
-        floor(min(frequency_max_per_um, b) / d + 0.5) + r for b, d, r in zip(band, spacing, reach, strict=True)
+    resources.require(
+        f"the stack of {terms} terms on {kept.shape[0]} x {kept.shape[1]} frequencies",
+        chosen.stack_bytes(terms, np.dtype(dtype).itemsize),
+        "use a smaller coherence.sigma_um, a smaller patch or fewer terms",
     )
-    shape = (2 * psi_max + 1, phi_max + reach[0] + 1, 2, terms)
-    _check_memory(shape, np.dtype(dtype).itemsize)
     transform = _taylor if basis == "taylor" else _chebyshev
-    coefficients = device.empty(shape, dtype)
-    transform(field, Kept(psi_max, phi_max, reach[0]), coefficients, progress)
-    return Stack(basis, coefficients, terms, psi_max, reach[0], spacing, reach, field.half_range_um, sigma_um, band)
+    values = device.empty((*kept.shape, 2, terms), dtype)
+    transform(field, kept, values, progress)
+    return Stack(
+        basis,
+        values,
+        terms,
+        kept.psi_max,
+        reach[0],
+        chosen.spacing_per_um,
+        reach,
+        field.half_range_um,
+        sigma_um,
+        field.band_limit_per_um,
+    )
 
 
 def _taylor(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
@@ -140,14 +204,21 @@ def crop_to_window(field: HeightField, sigma_um: float) -> HeightField:
     sigma_um: standard deviation of the coherence window, um. Returns the middle part of the field.
     """
     ny, nx = field.shape
-    # lengths that are products of small primes are fast to transform
-    keep_x, keep_y = (
-        min(n, next_fast_len(2 * int(np.ceil(BLIND_SIGMAS * sigma_um / pitch)) + 2, real=True))
-        for n, pitch in ((nx, field.pitch_um[0]), (ny, field.pitch_um[1]))
-    )
+    keep_y, keep_x = _kept_samples(field.extent, sigma_um)
     # the middle sample remains at index n // 2
     x, y = nx // 2 - keep_x // 2, ny // 2 - keep_y // 2
     return HeightField(field.heights_um[y : y + keep_y, x : x + keep_x], field.pitch_um)
+
+
+def _kept_samples(extent: Extent, sigma_um: float) -> tuple[int, int]:
+    """Computes the samples (ny, nx) within 8.5 sigma of the middle."""
+    (ny, nx), (pitch_x, pitch_y) = extent.shape, extent.pitch_um
+    # lengths that are products of small primes are fast to transform
+    keep_y, keep_x = (
+        min(n, next_fast_len(2 * int(np.ceil(BLIND_SIGMAS * sigma_um / pitch)) + 2, real=True))
+        for n, pitch in ((ny, pitch_y), (nx, pitch_x))
+    )
+    return keep_y, keep_x
 
 
 def window_tolerance(tolerance: float) -> float:
@@ -170,13 +241,3 @@ def window_reach(spacing: tuple[float, float], sigma_um: float, tolerance: float
     radius = reach_sigmas(tolerance) * sigma_f(sigma_um)
     x, y = (floor(radius / d + 0.5) for d in spacing)
     return x, y
-
-
-def _check_memory(shape: tuple[int, ...], itemsize: int) -> None:
-    need = itemsize * int(np.prod(shape, dtype=np.int64))
-    if need > _MOST_BYTES:
-        raise AccuracyError(
-            f"the stack of {shape[3]} terms on {shape[0]} x {shape[1]} frequencies needs {need / 2**30:.1f} GiB, "
-            f"more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller coherence.sigma_um, a smaller patch "
-            "or fewer terms."
-        )

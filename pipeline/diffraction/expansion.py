@@ -63,8 +63,7 @@ def plan_taylor(field: HeightField, quadrature: Quadrature, tolerance: float, or
     Returns the order with its errors. Raises AccuracyError if they exceed the tolerance in float32 tables.
     """
     z = largest_phase(field.half_range_um, quadrature.lambda_min_nm)
-    # truncation, which enters twice, gets two fifths of the tolerance; rounding does not depend on the order
-    chosen = order if order is not None else taylor_order(z, 0.2 * tolerance)
+    chosen = order if order is not None else planned_order(z, tolerance)
     plan = TaylorPlan(chosen, _taylor_remainder(z, chosen), float32_rounding(field, quadrature))
     if plan.error > tolerance:
         raise AccuracyError(_refusal(plan, field, tolerance, order is not None))
@@ -84,6 +83,12 @@ def _refusal(plan: TaylorPlan, field: HeightField, tolerance: float, order_was_g
     if enough <= LARGEST_TOLERANCE:
         return text + f"Set table.tolerance = {enough:.0e}, or lower the heights (a scan's: surface.clip_percentile)."
     return text + "Lower the heights (a scan's outliers: surface.clip_percentile); no tolerance helps."
+
+
+def planned_order(z: float, tolerance: float) -> int:
+    """Computes the order N that `plan_taylor` chooses for the phase z, radians."""
+    # truncation, which enters twice, gets two fifths of the tolerance; rounding does not depend on the order
+    return taylor_order(z, 0.2 * tolerance)
 
 
 def taylor_order(z: float, tolerance: float) -> int:

@@ -74,9 +74,12 @@ def speckle_contrast(power: PolarPowerSpectrum) -> float:
     """Computes the variance of E relative to its squared local mean.
 
     It is 1 for fully developed speckle, and 1 / n for the mean over n independent windows. It is taken over azimuths
-    at the middle node in s, and is the median over the radii beyond the specular lobe.
+    at the middle node in s, and is the median over the radii beyond the specular lobe; 0 where a narrow cone of views
+    has none.
     """
     tiles, radii, nodes, lanes = power.values.shape
+    if radii - _SPARE_RADII <= radii // 4:
+        return 0.0
     e = np.moveaxis(power.values[:, radii // 4 : -_SPARE_RADII, nodes // 2], 2, 1).reshape(tiles * lanes, -1)
     kernel = np.ones(min(_CONTRAST_AZIMUTHS, len(e)))
     kernel /= len(kernel)
@@ -84,6 +87,16 @@ def speckle_contrast(power: PolarPowerSpectrum) -> float:
     local = np.fft.irfft(np.fft.rfft(e, axis=0) * np.fft.rfft(kernel, len(e))[:, None], len(e), axis=0)
     local = np.maximum(np.roll(local, -(len(kernel) // 2), axis=0), np.finfo(np.float32).tiny)
     return float(np.median(np.mean((e / local - 1.0) ** 2, axis=0)))
+
+
+def power_spectrum_bytes(azimuths: int, radii: int, nodes: int) -> int:
+    """Computes the size of E, bytes."""
+    return 4 * azimuths * radii * nodes
+
+
+def contrast_bytes(azimuths: int, radii: int) -> int:
+    """Computes the memory in which `speckle_contrast` works, bytes: E of one node, and its transforms and means."""
+    return (3 * 8 + 3 * 4) * azimuths * (radii - radii // 4)
 
 
 def s_nodes(count: int, s_max_per_um: float) -> Array:
@@ -123,9 +136,14 @@ def chebyshev_stack(
     tolerance: amplitude, relative to its peak, at which the window's transform is cut.
     Returns the stack. Raises AccuracyError and DeviceError as `dft_stack.build` does.
     """
-    filled = polar_power_spectrum.LANES * ceil(terms / polar_power_spectrum.LANES)
+    filled = filled_terms(terms)
     built = dft_stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
     return replace(built, terms=terms)
+
+
+def filled_terms(terms: int) -> int:
+    """Computes the length of the last axis of such a stack."""
+    return polar_power_spectrum.LANES * ceil(terms / polar_power_spectrum.LANES)
 
 
 def s_max(lambda_min_nm: float) -> float:

@@ -7,13 +7,16 @@
   as the rows of a map, share sums.
 """
 
+import os
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import windowed_dft
+from pipeline import resources
 from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.upload import upload
@@ -22,6 +25,7 @@ from pipeline.optics.coherence import folded_window
 from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 
 STEP_NM = FINE_STEP_NM
@@ -126,13 +130,10 @@ class Reference:
         """Transforms the Chebyshev terms of the height field.
 
         sigma_um: standard deviation of the coherence window, um. lambda_min_nm: shortest wavelength, nm.
-        Raises AccuracyError if the samples do not resolve the window or the stack does not fit into memory, and
-        DeviceError if no device works.
+        Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does not fit into
+        memory, and DeviceError if no device works.
         """
-        z = expansion.largest_phase(field.half_range_um, lambda_min_nm)
-        # whole vectors of terms cost the same, and the device uses them without a copy
-        lanes = windowed_dft.LANES
-        terms = lanes * -(-(expansion.chebyshev_order(z, _TOLERANCE) + 1) // lanes)
+        terms = _terms(field.half_range_um, lambda_min_nm)
         reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
         built = dft_stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
         self._sigma_um = sigma_um
@@ -209,6 +210,72 @@ class MeanReference:
         for field in self.fields[1:]:
             total = total + answer(Reference(field, self._sigma_um, self._lambda_min_nm, self._progress))
         return total / len(self.fields)
+
+
+def _terms(half_range_um: float, lambda_min_nm: float) -> int:
+    """Computes the number of terms: whole vectors cost the same, and the device uses them without a copy."""
+    z = expansion.largest_phase(half_range_um, lambda_min_nm)
+    return windowed_dft.LANES * -(-(expansion.chebyshev_order(z, _TOLERANCE) + 1) // windowed_dft.LANES)
+
+
+@dataclass(frozen=True)
+class ReferenceSize:
+    """The size of a `MeanReference`, known before it is made.
+
+    terms: of its series. stack: size of its stacks. windows: positions of the coherence window. extent: of the
+    height field.
+    """
+
+    terms: int
+    stack: dft_stack.StackSize
+    windows: int
+    extent: Extent
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its stack and of the height field of every window."""
+        return self.stack.stack_bytes(self.terms, 8) + self.windows * self.extent.bytes
+
+    def making(self) -> resources.Arrays:
+        """Lists the arrays while the first stack is made."""
+        return {
+            "height fields of the reference": self.windows * self.extent.bytes,
+            **self.stack.chebyshev_bytes(self.terms, 8),
+        }
+
+    def answering(self, directions: int, wavelengths: int, material: Material) -> resources.Arrays:
+        """Lists the arrays while it answers for directions: stacks, |P|^2 of a tile, a metal's reflectance there.
+
+        The stacks of other windows are made while the answer of the first is kept.
+        """
+        tile = min(directions, _DIRECTIONS_AT_ONCE)
+        units = os.cpu_count() or 1
+        power = windowed_dft.exact_power_bytes(tile, wavelengths, self.stack.reach[0], self.terms, units)
+        # four complex arrays of Fresnel's equations, R and its product with |P|^2
+        metal = (4 * 16 + 2 * 8) * tile * wavelengths if material.fresnel == "conductor" else 0
+        others = self.stack.chebyshev_bytes(self.terms, 8) if self.windows > 1 else {}
+        return {
+            "reference": self.nbytes,
+            "|P|^2 of directions": power,
+            "reflectances of directions": metal,
+            "reference of another window": sum(others.values()),
+        }
+
+    def seconds(self, directions: float, wavelengths: int) -> float:
+        """Estimates the time of an answer: the coefficients under the window, of all terms, in double precision."""
+        taps = (2 * self.stack.reach[0] + 1) * (2 * self.stack.reach[1] + 1)
+        return resources.seconds(2.0 * self.windows * directions * wavelengths * taps * 2 * self.terms)
+
+
+def size(extent: Extent, sigma_um: float, lambda_min_nm: float, windows: int) -> ReferenceSize:
+    """Computes the size of a `MeanReference` of a height field before it is made.
+
+    extent: of the height field. sigma_um: standard deviation of the coherence window, um. lambda_min_nm: shortest
+    wavelength, nm. windows: number of positions of the window.
+    """
+    reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
+    chosen = dft_stack.size(extent, sigma_um, reachable, _TOLERANCE)
+    return ReferenceSize(_terms(extent.half_range_um, lambda_min_nm), chosen, windows, extent)
 
 
 def _tiles(count: int) -> Iterator[slice]:

@@ -80,6 +80,18 @@ class _Workspace:
         self._places.put(self._spectrum, out)
 
 
+def plans_bytes(shape: tuple[int, int], kept: Kept, terms: int, real: np.dtype[Any]) -> int:
+    """Computes the size of the arrays of all plans, bytes; the parameters are those of `transform`."""
+    places = KeptCoefficients(shape, kept)
+    return _at_once(shape, places, terms, real) * _Workspace.bytes(shape, places, real)
+
+
+def _at_once(shape: tuple[int, int], places: KeptCoefficients, terms: int, real: np.dtype[Any]) -> int:
+    """Computes how many terms are transformed at once."""
+    room = _MOST_BYTES // _Workspace.bytes(shape, places, real)
+    return max(1, min(os.cpu_count() or 1, terms, room))
+
+
 def transform(terms: Iterable[NDArray[Any]], kept: Kept, out: NDArray[Any], progress: Progress = silent) -> None:
     """Computes mean(term exp(+2 pi i f.x)) of every term, at the coefficients that are kept.
 
@@ -92,9 +104,8 @@ def transform(terms: Iterable[NDArray[Any]], kept: Kept, out: NDArray[Any], prog
     count, left = out.shape[3], iter(terms)
     first = next(left)
     places = KeptCoefficients(first.shape, kept)
-    room = _MOST_BYTES // _Workspace.bytes(first.shape, places, out.dtype)
     with wisdom.planning():
-        at_once = max(1, min(os.cpu_count() or 1, count, room))
+        at_once = _at_once(first.shape, places, count, out.dtype)
         workspaces = [_Workspace(first.shape, places, out.dtype) for _ in range(at_once)]
     running: deque[Future[None]] = deque()
     with ThreadPoolExecutor(at_once) as threads:

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.validated import Finite, Validated
+from pipeline.validated import Azimuth, Validated
 
 # far below the width of any lobe, and above the rounding of whole turns
 _SAME_DEG = 1e-6
@@ -14,7 +14,7 @@ class Direction(Validated):
     """A direction that points away from the surface: polar angle from the normal, azimuth from +x to +y, degrees."""
 
     theta_deg: Annotated[float, Field(ge=0, lt=90)]
-    phi_deg: Finite = 0.0
+    phi_deg: Azimuth = 0.0
 
     def same_as(self, other: "Direction") -> bool:
         """Whether both are one direction; whole turns, and the azimuth of the normal, make no difference."""
@@ -23,9 +23,9 @@ class Direction(Validated):
 
 
 class Views(Validated):
-    """The cone of views up to a polar angle, degrees."""
+    """The cone of views up to a polar angle, degrees: a tenth of a degree is a fifth of the pupil at 30 cm."""
 
-    theta_max_deg: Annotated[float, Field(gt=0, le=90)] = 90.0
+    theta_max_deg: Annotated[float, Field(ge=0.1, le=90)] = 90.0
 
 
 Lights = Annotated[list[Direction], Field(min_length=1)]

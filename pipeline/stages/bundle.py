@@ -10,6 +10,8 @@ from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.errors import DamagedError
 from pipeline.progress import Progress
+from pipeline.resources import Need, largest
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.stages.validate import REPORT
@@ -57,6 +59,15 @@ def place(artifact: Artifact, out: Path) -> Path:
     if Path(name).name != name:
         raise DamagedError(f"{artifact.folder}: expected the name of a bundle, got {name!r}; remove this folder")
     return publish.place(artifact.folder / _CONTENT, out, name)
+
+
+def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
+    """Computes memory and time of this stage: the table and its textures."""
+    held = foreseen.held(transform=sizes.transform_bytes, reference=foreseen.reference.nbytes)
+    kept = {**spare(sizes.freed_bytes, sizes.study.buffer), **heap(sizes.transform_bytes, sizes.table_bytes)}
+    table = {"table": sizes.table_bytes, "textures": sizes.stored_bytes}
+    arrays = largest(foreseen.reading(**table), {**table, **sizes.prepared.arrays})
+    return Need({**base("bundle"), **kept, **held, **arrays}, 5e-8 * sizes.table_bytes)
 
 
 def stage_of(layout: Layout) -> Stage:

@@ -4,18 +4,18 @@ from pipeline.config.models import Config
 from pipeline.errors import BakeError, ConfigError
 from pipeline.optics import brdf
 from pipeline.optics.light import Light, trapezoid
-from pipeline.surface.recipes.patch import patch_of
+from pipeline.stages import forecast
 
 
 def check(config: Config, source: str) -> None:
-    """Checks that a recipe fits its patch, and that illuminant and metal cover the wavelengths.
+    """Checks that a recipe fits its patch, that its bake ends, and that light and metal cover the wavelengths.
 
     config: a valid config. source: its name for messages, such as the file.
     Raises ConfigError, with the key of each fault.
     """
     if config.surface.recipe is not None:
         try:
-            patch_of(config.surface.recipe)
+            forecast.require_an_end(config, source)
         except ConfigError as error:
             raise ConfigError(source, error.faults) from None
     # the default is covered; a check of another light may import colour-science, which takes a second

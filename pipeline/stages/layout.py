@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.accuracy.convergence import CoarseMap, Study
 from pipeline.config.models import Config
+from pipeline.stages.foreseen import Foreseen, LayoutSizes
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import Evaluator, Table
@@ -25,6 +26,7 @@ class Layout:
     size: describes the size of the table, for a plan.
     study: returns the curves of error against each setting that `validate` shows, from config, inputs, the table's
         evaluator and the map on which errors are measured. study_remark: a sentence on them for the report.
+    sizes: computes memory and time of the layout's stages before they begin.
     settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
     prepare: makes the table's part of a bundle.
     """
@@ -38,5 +40,6 @@ class Layout:
     size: Callable[[Config], str]
     study: Callable[[Config, Inputs, Evaluator, CoarseMap], Study]
     study_remark: str
+    sizes: Callable[[Foreseen], LayoutSizes]
     settings: Callable[[Summary, Summary], list[list[str]]]
     prepare: "Callable[[Config, Inputs], Prepared]"

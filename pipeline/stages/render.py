@@ -13,8 +13,10 @@ from pipeline.optics.colour import clipped, pixels
 from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images
+from pipeline.resources import Need, largest
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
-from pipeline.tables.evaluate import Map, interpolator, never_negative, render_map
+from pipeline.tables.evaluate import Map, interpolator, look_up_bytes, map_bytes, never_negative, render_map
 
 
 def _parameters(config: Config) -> dict[str, Any]:
@@ -61,6 +63,21 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         )
         progress("maps", (i + 1) / len(config.render.lights))
     return {"maps": maps, "exposure_ru": config.render.exposure_ru, "size": config.render.size}
+
+
+def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
+    """Computes memory and time of this stage: the table and one map at a time."""
+    config, reference = foreseen.config, foreseen.reference
+    wavelengths = 1 if config.light.is_line else foreseen.wavelengths
+    objects = {"transform": sizes.transform_bytes, "reference": reference.nbytes, "textures": sizes.stored_bytes}
+    held = {**foreseen.held(**objects), **heap(sizes.transform_bytes, sizes.table_bytes)}
+    factor = 0 if config.table.holds_metals else look_up_bytes(wavelengths, config.material)
+    arrays = largest(
+        foreseen.reading(table=sizes.table_bytes),
+        {"table": sizes.table_bytes, "map": map_bytes(config.render.size), "factor of directions": factor},
+    )
+    seconds = 1e-6 * len(config.render.lights) * config.render.size**2
+    return Need({**base("render"), **spare(sizes.freed_bytes), **held, **arrays}, seconds)
 
 
 RENDER = Stage("render", 4, ("table", "textures"), _parameters, _produce, uses_device=True)

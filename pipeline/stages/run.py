@@ -7,14 +7,16 @@ from importlib import import_module
 from threading import Thread
 from typing import Any
 
+from kernels.device import default_device
 from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.diffraction.device import require_device
 from pipeline.progress import Progress, silent
-from pipeline.stages import bundle, provenance, validate
+from pipeline.resources import Need
+from pipeline.stages import bundle, forecast, provenance, validate
 from pipeline.stages.render import RENDER
 from pipeline.stages.session import Session
-from pipeline.stages.stage import Inputs, Stage
+from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.stages.surface import SURFACE
 from pipeline.store.store import Artifact, Store
 
@@ -46,10 +48,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Explanation:
-    """The reason why a step is cached or to do, and its cost, as texts."""
+    """The reason why a step is cached or to do, and its cost, as texts; and what it needs, None where unknown."""
 
     reason: str
     cost: str
+    need: Need | None
 
 
 def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
@@ -72,11 +75,13 @@ def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation
     """
     earlier = store.artifacts()
     made = {step.stage.name for step in steps if not step.cached}
+    needs = forecast.needs(config, summaries(steps, store))
     explanations = []
     for step in steps:
         last = _latest(earlier, step.stage.name, config.name)
         reason = UNCHANGED if step.cached else _reason(step.stage, config, made, last)
-        explanations.append(Explanation(reason, _cost(step.stage, config, last)))
+        need = needs.get(step.stage.name)
+        explanations.append(Explanation(reason, _cost(step.stage, config, last, need), need))
     return explanations
 
 
@@ -105,7 +110,8 @@ def execute(
     progress: called with a step's name and its completed share, 0 to 1.
     on_step: called after each step with the seconds that it took, None where it was cached.
     Returns every step's artifact by stage; its record is checked, its files are not.
-    Raises DeviceError where a step needs a device and none works, and the errors of the stages and the store.
+    Raises ResourceError where a step needs more memory than is allowed, DeviceError where a step needs a device and
+    none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
     if any(step.stage.uses_device and not step.cached for step in steps):
@@ -118,6 +124,7 @@ def execute(
     session = Session()
     for step in steps:
         name, seconds = step.stage.name, None
+        require_memory(config, steps, store)
         if store.has(name, step.key):
             store.touch(name, step.key)
         else:
@@ -155,6 +162,25 @@ class _Device(Thread):
         self.join()
         if self._fault is not None:
             raise self._fault
+
+
+def require_memory(config: Config, steps: list[Step], store: Store) -> None:
+    """Raises ResourceError where a step that is to do needs more memory than is allowed, before it begins.
+
+    Made artifacts tell the samples of a scan and the plan of a table; without them these are foreseen, as far as the
+    config says.
+    """
+    to_do = [step.stage.name for step in steps if not store.has(step.stage.name, step.key)]
+    if to_do:
+        used = any(step.stage.uses_device for step in steps if step.stage.name in to_do)
+        buffer = default_device().largest_bytes if used else 2**62
+        forecast.require_memory(config, summaries(steps, store), to_do, buffer)
+
+
+def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:
+    """Returns the summaries of those steps of a plan whose artifacts are in the store, by stage."""
+    made = [step for step in steps if store.has(step.stage.name, step.key)]
+    return {step.stage.name: store.describe(step.stage.name, step.key).summary for step in made}
 
 
 def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress) -> None:
@@ -207,8 +233,8 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
     return [path + (values if len(values) < 40 else "")]
 
 
-def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
-    """Describes the work of a stage, and the time that it took last, in s."""
+def _cost(stage: Stage, config: Config, last: Artifact | None, need: Need | None) -> str:
+    """Describes the work of a stage, and the time that it took last, in s, or an estimate of it."""
     texts = {
         "power_spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
         "table": layouts.of(config.table).size(config),
@@ -221,4 +247,6 @@ def _cost(stage: Stage, config: Config, last: Artifact | None) -> str:
     seconds = None if last is None else last.record.get("provenance", {}).get("seconds")
     if seconds is not None:
         parts.append(f"{seconds:.1f} s last time")
+    elif need is not None:
+        parts.append(f"about {max(need.seconds, 0.1):.1g} s")
     return ", ".join(parts) or "unknown before it has run once"

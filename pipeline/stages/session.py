@@ -7,6 +7,11 @@ from typing import Any, Protocol, TypeVar
 _KEPT_BYTES = 2**28
 
 
+def kept_bytes(nbytes: int) -> int:
+    """Returns how much of an object of this size a session holds between stages: all or nothing."""
+    return nbytes if nbytes <= _KEPT_BYTES else 0
+
+
 class Sized(Protocol):
     """An object with a size in memory."""
 

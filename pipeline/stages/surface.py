@@ -9,14 +9,19 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import InputError
 from pipeline.progress import Progress
+from pipeline.resources import Need, largest
+from pipeline.stages.foreseen import base
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store import arrays, digest
+from pipeline.store.arrays import saving_bytes
 from pipeline.store.store import Artifact
 from pipeline.surface import recipes
 from pipeline.surface.conditioning import ConditioningRecord, condition
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.readers import require_file
-from pipeline.surface.statistics import SurfaceStatistics, measure
+from pipeline.surface.source import SurfaceSource
+from pipeline.surface.statistics import SurfaceStatistics, measure, measuring_bytes
 
 _FILE = "surface.zarr"
 # the smallest share of the visible frequencies within the Nyquist limits with which a bake makes sense
@@ -74,6 +79,28 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
             *_warnings(statistics, config.coherence.sigma_um, lambda_min, is_scan=scan is not None),
         ],
     }
+
+
+def need(source: SurfaceSource, extent: Extent, lambda_min_nm: float) -> Need:
+    """Computes memory and time of this stage from its samples.
+
+    A recipe is made, or a scan conditioned in five arrays; then the conditioned field is measured.
+    """
+    making = 5 * extent.bytes if source.recipe is None else recipes.making_bytes(source.recipe, extent.samples)
+    measuring = measuring_bytes(extent, lambda_min_nm)
+    arrays = largest(
+        {"making of the heights": making + extent.bytes},
+        {"height field": extent.bytes, "statistics of the heights": measuring},
+        {"height field": extent.bytes, "writing": saving_bytes(extent.bytes)},
+    )
+    return Need({**base("surface"), **arrays}, 1e-6 * extent.samples)
+
+
+def extent_in(summary: Summary) -> Extent:
+    """Reads the extent of the height field in the summary of this stage."""
+    statistics = summary["statistics"]
+    shape, pitch = statistics["shape"], statistics["pitch_um"]
+    return Extent((shape[0], shape[1]), (pitch[0], pitch[1]), 0.5 * statistics["range_um"])
 
 
 def _slope_warnings(cleaning: ConditioningRecord) -> list[str]:

@@ -3,6 +3,7 @@
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import asdict
 from importlib import import_module
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ from pipeline import layouts
 from pipeline.accuracy import checks, convergence
 from pipeline.config.models import Config
 from pipeline.progress import Progress
+from pipeline.resources import Need, largest
 from pipeline.stages import render, surface
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
 from pipeline.tables.evaluate import table_evaluator
@@ -93,6 +96,32 @@ def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
     measured = max(e["mean"] for m in maps for e in m["colour"] if e["exposure_ru"] == exposure)
     met = None if asked is None else measured <= asked
     return {"delta_e": asked, "exposure_ru": exposure, "measured": measured, "met": met}
+
+
+def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
+    """Computes memory and time of this stage.
+
+    Table, textures, transform and reference exist throughout. The maps of all lights wait for their drawing.
+    """
+    config, reference = foreseen.config, foreseen.reference
+    lights = len(config.render.lights)
+    views, wavelengths = round(pi / 4 * checks.MAP_SIZE**2), foreseen.wavelengths
+    transform = {"transform": sizes.transform_bytes}
+    table = {"table": sizes.table_bytes, "textures": sizes.stored_bytes}
+    kept = {**spare(sizes.freed_bytes, sizes.study.buffer), **heap(sizes.transform_bytes, sizes.table_bytes)}
+    answering = reference.answering(views, wavelengths, config.material)
+    maps = {"maps of all lights": lights * 2 * checks.MAP_SIZE**2 * 3 * 8, **answering}
+    arrays = largest(
+        {"reference": reference.nbytes, **foreseen.reading(**table)},
+        {"reference": reference.nbytes, **table, **foreseen.reading(transform=sizes.transform_bytes)},
+        {"reference": reference.nbytes, **table, **transform, **sizes.study.arrays},
+        {**table, **transform, **reference.making()},
+        {**table, **transform, **maps},
+    )
+    # the rows of a map share sums over columns
+    shared = (2 * reference.stack.reach[1] + 1) / 2
+    seconds = sizes.study.seconds + (lights + 0.05) * reference.seconds(views, wavelengths) / shared
+    return Need({**base("validate"), **kept, **foreseen.held(), **arrays}, seconds, sizes.study.buffer)
 
 
 def stage_of(layout: Layout) -> Stage:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.surface.extent import Extent
+
 
 @dataclass(frozen=True)
 class HeightField:
@@ -21,6 +23,11 @@ class HeightField:
     def nbytes(self) -> int:
         """Bytes of the heights."""
         return self.heights_um.nbytes
+
+    @property
+    def extent(self) -> Extent:
+        """Samples, pitch and height range."""
+        return Extent(self.shape, self.pitch_um, self.half_range_um)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.fourier import backend as fourier
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.periods import Period, dominant_periods
 
@@ -71,6 +72,18 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
         seam_energy=_seam_energy(heights),
         windows=(size_x / sigma_um, size_y / sigma_um),
     )
+
+
+def measuring_bytes(extent: Extent, lambda_min_nm: float) -> int:
+    """Computes the memory in which `measure` works, bytes.
+
+    Either the nine arrays of samples of `_seam_energy` (three of them complex, two real, one as a temporary), or, in
+    `periods`, six of samples, and six of those frequencies that views can reach.
+    """
+    kept = float(extent.samples)
+    for pitch in extent.pitch_um:
+        kept *= min(1.0, 2.0 * pitch * 2e3 / lambda_min_nm)
+    return 8 * round(max(9 * extent.samples, 5 * extent.samples + 5.5 * kept))
 
 
 def _seam_energy(heights: Array) -> float:

@@ -24,11 +24,21 @@ def places(field: HeightField, coherence: Coherence) -> list[HeightField]:
     field: the whole scan. coherence: width of the window, and whether several are wanted.
     Returns one field per position, that of the middle first.
     """
-    along = [_offsets(size, coherence.sigma_um) if coherence.windows == "auto" else [0.0] for size in field.size_um]
+    along = _along(field.size_um, coherence)
     shifts = [(round(y / field.pitch_um[1]), round(x / field.pitch_um[0])) for y in along[1] for x in along[0]]
     # the smallest shift first: planning and checks on a single window use that of the middle
     shifts.sort(key=lambda shift: (abs(shift[0]) + abs(shift[1]), shift))
     return [HeightField(np.roll(field.heights_um, (-y, -x), axis=(0, 1)), field.pitch_um) for y, x in shifts]
+
+
+def count(size_um: tuple[float, float], coherence: Coherence) -> int:
+    """Computes how many positions a patch of this size (x, y), um, has."""
+    along_x, along_y = _along(size_um, coherence)
+    return len(along_x) * len(along_y)
+
+
+def _along(size_um: tuple[float, float], coherence: Coherence) -> list[list[float]]:
+    return [_offsets(size, coherence.sigma_um) if coherence.windows == "auto" else [0.0] for size in size_um]
 
 
 def _offsets(size_um: float, sigma_um: float) -> list[float]:

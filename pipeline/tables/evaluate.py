@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
+from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent
 
 # computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3), in the unit of the material's normalisation
@@ -50,12 +51,13 @@ def interpolator(table: Table, radiometry: Radiometry, progress: Progress = sile
     """
 
     def evaluate(wi: Array, wr: Array) -> Array:
-        factor = table.direction_factor(radiometry, wi, wr)
         uvw = geometry.uvw(wi, wr)
         out = np.empty((len(wr), 3))
         for first in range(0, len(wr), _AT_ONCE):
             part = np.s_[first : first + _AT_ONCE]
-            out[part] = factor[part, None] * table.look_up(uvw[part])
+            # a metal's reflectance takes an array over wavelengths for every direction
+            factor = table.direction_factor(radiometry, wi[part], wr[part])
+            out[part] = factor[:, None] * table.look_up(uvw[part])
             progress("look-up", min(1.0, (first + _AT_ONCE) / len(wr)))
         out[~geometry.above_horizon(wi, wr)] = 0.0
         return out
@@ -98,6 +100,22 @@ class Map:
         out = np.zeros((self.size, self.size, *values.shape[1:]))
         out[self.inside] = values
         return out
+
+
+def map_bytes(size: int) -> int:
+    """Computes the memory of a map and of its picture, bytes: four arrays of XYZ or sRGB in float64.
+
+    Directions, factors and values of the views take less.
+    """
+    return 4 * 3 * 8 * size**2
+
+
+def look_up_bytes(wavelengths: int, material: Material) -> int:
+    """Computes the memory of a metal's factor for the directions that are looked up at once, bytes.
+
+    wavelengths: of the mean over wavelength. Fresnel's equations hold four complex arrays.
+    """
+    return 4 * 16 * _AT_ONCE * wavelengths if material.fresnel == "conductor" else 0
 
 
 def render_map(evaluate: Evaluator, light: Array, views: Map) -> Array:

@@ -11,7 +11,7 @@ def test_of_an_empty_store_all_is_to_do_and_nothing_is_written(tool: Tool) -> No
     assert result.stderr == ""
     lines = result.stdout.splitlines()
     assert lines[0] == "small:"
-    assert lines[1].split() == ["stage", "state", "cost"]
+    assert lines[1].split() == ["stage", "state", "peak", "cost"]
     assert [line.split()[:3] for line in lines[2:9]] == [[stage, "to", "do"] for stage in STAGES]
     assert lines[9:16] == [f"{stage}: not made before" for stage in STAGES]
     assert sorted(path.name for path in tool.folder.iterdir()) == ["small.toml"]

@@ -3,6 +3,7 @@
 import gc
 
 import numpy as np
+import pytest
 
 from kernels import device
 
@@ -43,3 +44,11 @@ def test_what_is_lent_holds_the_array():
     for part in (array, array[:, :16]):
         found = device.download(device.lent(part), np.empty(part.shape, np.float32))
         np.testing.assert_array_equal(found, part)
+
+
+def test_memory_that_cannot_be_had_leaves_nothing_to_delete(recwarn):
+    """An object that was never made would be deleted with a traceback on stderr."""
+    with pytest.raises(MemoryError):
+        device.empty((1 << 50,), np.float32)
+    gc.collect()
+    assert list(recwarn) == []

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from pipeline.accuracy.convergence import CoarseMap, PolarStudy, Study
 from pipeline.config.models import Config
 from pipeline.stages.layout import Layout
-from pipeline.stages.polar import power_spectrum, table, textures
+from pipeline.stages.polar import power_spectrum, sizes, table, textures
 from pipeline.stages.stage import Inputs, Summary
 from pipeline.tables.evaluate import Evaluator
 
@@ -71,6 +71,7 @@ LAYOUT = Layout(
     size=_size,
     study=_study,
     study_remark="Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked.",
+    sizes=sizes.sizes,
     settings=_settings,
     prepare=_prepare,
 )

@@ -91,8 +91,13 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 def planned(artifact: Artifact) -> plan.Plan:
     """Reads the plan in the record of an artifact of this stage."""
-    found = {key: artifact.summary[key] for key in ("terms", "s_nodes", "w_terms", "probed_delta_e")}
-    azimuths, rings = Azimuths(**artifact.summary["azimuths"]), Rings(**artifact.summary["rings"])
+    return plan_in(artifact.summary)
+
+
+def plan_in(summary: Summary) -> plan.Plan:
+    """Reads the plan in the summary of this stage."""
+    found = {key: summary[key] for key in ("terms", "s_nodes", "w_terms", "probed_delta_e")}
+    azimuths, rings = Azimuths(**summary["azimuths"]), Rings(**summary["rings"])
     return plan.Plan(azimuths=azimuths, rings=rings, **found)
 
 

@@ -6,7 +6,7 @@ from pipeline.accuracy.convergence import CoarseMap, Study, TaylorStudy
 from pipeline.config.models import Config
 from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Summary
-from pipeline.stages.taylor import stack, table, textures
+from pipeline.stages.taylor import sizes, stack, table, textures
 from pipeline.tables.evaluate import Evaluator
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ LAYOUT = Layout(
     size=_size,
     study=_study,
     study_remark="Terms and step are varied at the directions of the map itself, without a grid.",
+    sizes=sizes.sizes,
     settings=_settings,
     prepare=_prepare,
 )

@@ -4,8 +4,10 @@
 `snakes.py` hold closed forms and seeded constructions.
 """
 
+from math import log, radians, sqrt, tan
 from typing import assert_never
 
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes import disc, gratings, random, snakes
 from pipeline.surface.recipes.parameters import (
@@ -20,6 +22,7 @@ from pipeline.surface.recipes.parameters import (
     TiltedMirror,
     Xenopeltis,
 )
+from pipeline.surface.recipes.patch import patch_of
 
 
 def make(recipe: Recipe) -> HeightField:
@@ -50,3 +53,51 @@ def make(recipe: Recipe) -> HeightField:
             return snakes.xenopeltis(recipe)
         case _:
             assert_never(recipe)
+
+
+def extent(recipe: Recipe) -> Extent:
+    """Computes the extent of a recipe's height field without making it.
+
+    Returns samples, pitch and height range; that of a random surface is expected of independent samples, which are
+    as high as any of as many correlated ones.
+    Raises ConfigError as `make` does.
+    """
+    patch = patch_of(recipe)
+    match recipe:
+        case Mirror():
+            height = 0.0
+        case TiltedMirror():
+            tilts = zip(patch.size_um, (recipe.tilt_x_deg, recipe.tilt_y_deg), strict=True)
+            height = sum(size * abs(tan(radians(tilt))) for size, tilt in tilts)
+        case Sinusoid():
+            height = 2.0 * recipe.amplitude_um
+        case CompactDisc():
+            height = recipe.depth_um
+        case GaussianRandom():
+            samples = patch.shape[0] * patch.shape[1]
+            height = 2.0 * sqrt(2.0 * log(max(samples, 2))) * recipe.sigma_h_um
+        case Rectangular() | Blazed() | Elaphe() | Xenopeltis():
+            height = recipe.height_um
+        case _:
+            assert_never(recipe)
+    return Extent(patch.shape, patch.pitch_um, 0.5 * height)
+
+
+def making_bytes(recipe: Recipe, samples: int) -> int:
+    """Computes the memory in which `make` works, bytes: so many arrays of float64 at its peak.
+
+    Noise takes four: the random numbers, their transform, the filtered spectrum and the heights. Fingers add the
+    positions along and across them, their shapes, and the three noises that join them.
+    """
+    match recipe:
+        case Mirror() | Sinusoid() | Rectangular() | Blazed():
+            arrays = 1
+        case TiltedMirror() | CompactDisc():
+            arrays = 2
+        case GaussianRandom():
+            arrays = 5
+        case Elaphe() | Xenopeltis():
+            arrays = 13
+        case _:
+            assert_never(recipe)
+    return 8 * arrays * samples

@@ -1,7 +1,7 @@
 """The layout of a recipe's samples: a whole number of periods on a whole number of samples."""
 
 from dataclasses import dataclass
-from math import gcd
+from math import gcd, radians, tan
 from typing import assert_never
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError
 from pipeline.surface.recipes.parameters import (
+    LARGEST_RANGE_UM,
     Blazed,
     CompactDisc,
     Elaphe,
@@ -100,10 +101,23 @@ def patch_of(recipe: Recipe) -> Patch:
             return _lay_out(recipe, period_x_um=recipe.across_um)
         case Xenopeltis():
             return _lay_out(recipe, recipe.across_um, recipe.along_um)
-        case Mirror() | TiltedMirror():
+        case TiltedMirror():
+            return _tilted_patch(recipe)
+        case Mirror():
             return _lay_out(recipe)
         case _:
             assert_never(recipe)
+
+
+def _tilted_patch(recipe: TiltedMirror) -> Patch:
+    """Lays out a plane that rises no higher along either axis than scans may."""
+    patch = _lay_out(recipe)
+    for name, size, tilt in zip("xy", patch.size_um, (recipe.tilt_x_deg, recipe.tilt_y_deg), strict=True):
+        height = size * abs(tan(radians(tilt)))
+        if height > LARGEST_RANGE_UM:
+            text = f"expected a rise of at most {LARGEST_RANGE_UM:g} um over {size:g} um, got {height:.4g} um"
+            raise refusal(recipe, f"tilt_{name}_deg", text)
+    return patch
 
 
 def _disc_patch(recipe: CompactDisc) -> Patch:

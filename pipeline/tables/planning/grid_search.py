@@ -9,17 +9,17 @@ from math import asinh, ceil, sqrt
 
 import numpy as np
 
+from pipeline import resources
 from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
-from pipeline.errors import AccuracyError
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.scene import Scene
 from pipeline.tables.planning.anisotropy import anisotropy
 from pipeline.tables.planning.probes import Probes
 from pipeline.tables.planning.trial import Trial
+from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 
 _GRID_SHARE = 0.65  # share of the budget for the error at the test directions
-_MOST_BYTES = 3 * 2**30
 # start of the search: the grid that keeps a dE of 0.1 on snake scans with sigma = 16.25 um
 _BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0253, 0.12
 _LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
@@ -28,38 +28,15 @@ _GROWTH = 1.5
 _NEAR = 0.75  # share of the target above which the search ends
 
 
-class GridSearch:
-    """The search for the grid of one surface. Numbers of rings and azimuths that the layout sets are kept."""
+class Grids:
+    """The grids among which the search chooses, known before a surface is transformed."""
 
-    def __init__(
-        self, trial: Trial, layout: PolarLayout, scene: Scene | None, delta_e: float, exposure_ru: float
-    ) -> None:
-        """Computes the anisotropy of the surface.
+    def __init__(self, bake: PolarBake, layout: PolarLayout, delta_e: float) -> None:
+        """Takes the settings of the tables, the numbers that the layout sets, and the mean CIELAB error allowed."""
+        self._bake, self._layout, self._delta_e = bake, layout, delta_e
+        self._rho_max, self._is_line = bake.rho_max, bake.radiometry.light.is_line
 
-        trial: the first window's stack. layout: numbers that are set. scene: lights and views, None for all.
-        delta_e: mean CIELAB error allowed. exposure_ru: exposure at which it is measured, RU.
-        """
-        self._trial, self._bake, self._layout, self._scene = trial, trial.bake, layout, scene
-        self._delta_e, self._exposure_ru = delta_e, exposure_ru
-        self._rho_max, self._is_line = trial.bake.rho_max, trial.bake.radiometry.light.is_line
-        self._stretch, self._axis = anisotropy(trial.stack)
-
-    def run(self) -> tuple[Azimuths, Rings, float | None]:
-        """Searches for the grid.
-
-        Returns the azimuths, the rings, and the mean error at the test directions, None if both numbers are set.
-        Raises AccuracyError if E does not fit into memory.
-        """
-        rings, azimuths = self._start()
-        # a power spectrum that does not fit into memory is refused before any table is measured
-        self._require_memory(azimuths)
-        error = None
-        if "auto" in (self._layout.rings, self._layout.azimuths):
-            rings, azimuths, error = self._smallest(rings, azimuths)
-            self._require_memory(azimuths)
-        return self._azimuths(azimuths), self._rings(rings), error
-
-    def _start(self) -> tuple[int, int]:
+    def first(self) -> tuple[int, int]:
         """Computes the first numbers of rings and azimuths: the error falls with the square of either."""
         finer = sqrt(_BASE_DELTA_E / self._delta_e)
         window = self._bake.sigma_um / _BASE_SIGMA_UM
@@ -89,21 +66,59 @@ class GridSearch:
         lobe = 1e-3 * self._bake.lambda_min_nm * sigma_f(self._bake.sigma_um)
         return max(_LEAST_RINGS, ceil(self._r0 * asinh(self._rho_max / self._r0) / lobe))
 
-    def _rings(self, count: int) -> Rings:
+    def rings(self, count: int) -> Rings:
+        """Places so many rings."""
         return Rings(count, self._r0, self._rho_max)
+
+    def clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
+        """Rounds and limits numbers of rings and azimuths, and replaces those that the layout sets."""
+        layout = self._layout
+        return (
+            int(np.clip(ceil(rings), self._least_rings, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
+            _whole_tiles(int(np.clip(azimuths, _LEAST_AZIMUTHS, _MOST_AZIMUTHS)))
+            if layout.azimuths == "auto"
+            else layout.azimuths,
+        )
+
+    def arrays(self, rings: int, azimuths: int) -> resources.Arrays:
+        """Lists the arrays of E and of a table from it."""
+        bake = self._bake
+        return {
+            "power spectrum": bake.power_spectrum_bytes(azimuths),
+            **bake.integral_size(self.rings(rings), azimuths).arrays(),
+        }
+
+
+class GridSearch:
+    """The search for the grid of one surface. Numbers of rings and azimuths that the layout sets are kept."""
+
+    def __init__(
+        self, trial: Trial, layout: PolarLayout, scene: Scene | None, delta_e: float, exposure_ru: float
+    ) -> None:
+        """Computes the anisotropy of the surface.
+
+        trial: the first window's stack. layout: numbers that are set. scene: lights and views, None for all.
+        delta_e: mean CIELAB error allowed. exposure_ru: exposure at which it is measured, RU.
+        """
+        self._trial, self._bake, self._layout, self._scene = trial, trial.bake, layout, scene
+        self._delta_e, self._exposure_ru = delta_e, exposure_ru
+        self._grids = Grids(trial.bake, layout, delta_e)
+        self._stretch, self._axis = anisotropy(trial.stack)
+
+    def run(self) -> tuple[Azimuths, Rings, float | None]:
+        """Searches for the grid.
+
+        Returns the azimuths, the rings, and the mean error at the test directions, None if both numbers are set.
+        Raises ResourceError if a grid needs more memory than is allowed.
+        """
+        rings, azimuths = self._grids.first()
+        error = None
+        if "auto" in (self._layout.rings, self._layout.azimuths):
+            rings, azimuths, error = self._smallest(rings, azimuths)
+        return self._azimuths(azimuths), self._grids.rings(rings), error
 
     def _azimuths(self, count: int) -> Azimuths:
         return Azimuths(count, self._stretch, self._axis)
-
-    def _require_memory(self, azimuths: int) -> None:
-        """Raises AccuracyError if E on this number of azimuths does not fit into memory."""
-        need = 4 * azimuths * self._bake.s_nodes * len(self._bake.radius_per_um)
-        if need > _MOST_BYTES:
-            raise AccuracyError(
-                f"the power spectrum on {azimuths} azimuths and {self._bake.s_nodes} nodes in s needs "
-                f"{need / 2**30:.1f} GiB, more than the {_MOST_BYTES / 2**30:.0f} GiB allowed. Use a smaller "
-                "coherence.sigma_um, lower the heights or raise accuracy.delta_e."
-            )
 
     def _smallest(self, rings: int, azimuths: int) -> tuple[int, int, float]:
         """Finds the numbers of rings and azimuths with the least product whose error is within the budget.
@@ -128,28 +143,22 @@ class GridSearch:
         left = max(target**2 - rest, 0.25 * target**2)
         best = rings, azimuths
         for _ in range(_ROUNDS):
-            before, best = best, self._clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25)
+            before, best = (
+                best,
+                self._grids.clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25),
+            )
             if errors.get(best, 0.0) > target:
                 # the model proposes a grid known to miss the target; a coarse grid can have a low error by chance
-                best = self._clipped(_GROWTH * before[0], _GROWTH * before[1])
+                best = self._grids.clipped(_GROWTH * before[0], _GROWTH * before[1])
             if _NEAR * target <= error(*best) <= target:
                 break
-            left *= min(4.0, (0.9 * target / error(*best)) ** 2)
+            # no error at all, where every test direction saturates or is black, asks for the coarsest grid
+            left *= min(2.0, 0.9 * target / max(error(*best), 1e-9 * target)) ** 2
         # numbers that the config sets were varied for the model only
-        allowed = {pair: errors[pair] for pair in errors if pair == self._clipped(*pair)}
+        allowed = {pair: errors[pair] for pair in errors if pair == self._grids.clipped(*pair)}
         met = [pair for pair in allowed if allowed[pair] <= target]
         best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(allowed, key=allowed.__getitem__)
         return *best, allowed[best]
-
-    def _clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
-        """Rounds and limits numbers of rings and azimuths, and replaces those that the layout sets."""
-        layout = self._layout
-        return (
-            int(np.clip(ceil(rings), self._least_rings, _MOST_RINGS)) if layout.rings == "auto" else layout.rings,
-            _whole_tiles(int(np.clip(azimuths, _LEAST_AZIMUTHS, _MOST_AZIMUTHS)))
-            if layout.azimuths == "auto"
-            else layout.azimuths,
-        )
 
     @cached_property
     def _probes(self) -> Probes:
@@ -157,8 +166,14 @@ class GridSearch:
 
     def _error(self, rings: int, azimuths: int) -> float:
         """Measures the mean CIELAB error of a table of this size at the test directions."""
-        self._require_memory(azimuths)
-        return self._probes.error(self._trial.table(self._azimuths(azimuths), self._rings(rings)))
+        # the search may leave the grid that was foreseen: the probes' tables are small and come first
+        probes, layout = self._probes, self._grids
+        resources.require(
+            f"the power spectrum on {azimuths} azimuths and the table of {rings} rings",
+            sum(layout.arrays(rings, azimuths).values()),
+            "use a smaller coherence.sigma_um, lower the heights or raise accuracy.delta_e",
+        )
+        return probes.error(self._trial.table(self._azimuths(azimuths), layout.rings(rings)))
 
 
 def _other(count: int, coarser: int) -> int:

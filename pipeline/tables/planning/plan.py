@@ -107,14 +107,25 @@ def start(
     sigma_um: standard deviation of the window, um. light: the range of wavelengths, or a laser line.
     scene: lights and views, None for all. budget: the error allowed. layout: numbers that are set.
     progress: called with the share done.
-    Returns the trial for `choose`. Raises AccuracyError if the samples do not resolve the window or the stack does
-    not fit into memory, and DeviceError if no device works.
+    Returns the trial for `choose`. Raises AccuracyError if the samples do not resolve the window, ResourceError if
+    the stack does not fit into memory, and DeviceError if no device works.
+    """
+    half_range_um = max(field.half_range_um for field in fields)
+    return Trial(numbers(half_range_um, sigma_um, light, scene, budget, layout), fields[0], progress)
+
+
+def numbers(
+    half_range_um: float, sigma_um: float, light: Light, scene: Scene | None, budget: Budget, layout: PolarLayout
+) -> PolarBake:
+    """Chooses the numbers of terms and nodes for a budget; the parameters are those of `start`.
+
+    half_range_um: half of the height range, um.
     """
     lambda_min, probing = light.lambda_min_nm, _probing_light(light, layout)
-    z = expansion.largest_phase(max(field.half_range_um for field in fields), lambda_min)
+    z = expansion.largest_phase(half_range_um, lambda_min)
     amplitude = AMPLITUDE_SHARE * budget.delta_e
     z_luminous = z * lambda_min / _middle_nm(probing)
-    bake = PolarBake(
+    return PolarBake(
         radiometry=Radiometry(probing, Material(normalisation="relative"), sigma_um),
         lambda_min_nm=lambda_min,
         rho_max=rho_max(scene),
@@ -125,14 +136,13 @@ def start(
         w_terms=_w_terms(z_luminous, probing, budget) if layout.w_terms == "auto" else layout.w_terms,
         quadrature_error=budget.quadrature,
     )
-    return Trial(bake, fields[0], progress)
 
 
 def choose(trial: Trial, scene: Scene | None, budget: Budget, layout: PolarLayout) -> Plan:
     """Searches for the smallest grid that keeps the budget on the trial's window.
 
     trial: made by `start` with the same scene, budget and layout.
-    Returns the plan. Raises AccuracyError if the power spectrum does not fit into memory.
+    Returns the plan. Raises ResourceError if a grid needs more memory than is allowed.
     """
     azimuths, rings, error = GridSearch(trial, layout, scene, budget.delta_e, budget.exposure_ru).run()
     bake = trial.bake

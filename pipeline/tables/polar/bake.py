@@ -12,8 +12,9 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.polar import quadrature
+from pipeline.tables.polar import quadrature, spectral_integral
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.spectral_integral import IntegralSize
 from pipeline.tables.polar.table import PolarTable
 
 
@@ -54,8 +55,8 @@ class PolarBake:
     def stack(self, field: HeightField, progress: Progress = silent) -> Stack:
         """Transforms the Chebyshev terms of the height field of one window, in float32.
 
-        Raises AccuracyError if the samples do not resolve the window or the stack does not fit into memory, and
-        DeviceError if no device works.
+        Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does not fit into
+        memory, and DeviceError if no device works.
         """
         reach = float(self.radius_per_um[-1])
         return power_spectrum.chebyshev_stack(field, self.sigma_um, reach, self.terms, self.tolerance, progress)
@@ -71,6 +72,17 @@ class PolarBake:
         """
         return quadrature.choose(self.radiometry.illumination, rho, self.sigma_um, self.quadrature_error)
 
+    def power_spectrum_bytes(self, azimuths: int) -> int:
+        """Computes the size of E on so many azimuths, bytes."""
+        return power_spectrum.power_spectrum_bytes(azimuths, len(self.radius_per_um), self.s_nodes)
+
+    def integral_size(self, rings: Rings, azimuths: int) -> IntegralSize:
+        """Computes the size of the table and of the integral that makes it."""
+        rho = rings.rho()
+        expected = quadrature.expected(self.radiometry.light, rho, self.sigma_um)
+        s_max = power_spectrum.s_max(self.lambda_min_nm)
+        return spectral_integral.size(self.radius_per_um, self.s_nodes, s_max, rho, expected, self.w_terms, azimuths)
+
     def table(self, power: PolarPowerSpectrum, rings: Rings, rules: RingQuadratures) -> PolarTable:
-        """Integrates E over the wavelengths of every ring. Raises AccuracyError if that does not fit into memory."""
+        """Integrates E over the wavelengths of every ring. Raises ResourceError if that does not fit into memory."""
         return polar.build(power, rings, rules, self.w_terms, self.radiometry.reflectance)

@@ -161,6 +161,11 @@ def _weights(table: PolarTable, scene: Scene | None) -> tuple[Array, Array]:
     return density, gram + _LEAST_GRAM * np.mean(np.diag(gram)) * np.eye(len(gram))
 
 
+def weighting_bytes(w_terms: int) -> int:
+    """Computes the memory in which the weights are found, bytes: T_k at the directions, with their angles."""
+    return 3 * 8 * _DIRECTIONS * w_terms
+
+
 def flattened(textures: Textures) -> Textures:
     """Divides textures by the envelope that fits them best, which narrows their range for half floats."""
     rho, nodes = textures.grid.rings.rho(), samples(textures.values)

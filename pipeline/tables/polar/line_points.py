@@ -88,6 +88,37 @@ class _Lines:
         return np.asarray(reached & far & alike)
 
 
+class _Groups:
+    """The groups of rings that share a line, and their numbers of points.
+
+    rings: number of rings (groups,). leader: index of the first (groups,).
+    stretch: rho over that of the group's first (n_rings,).
+    first: index of the first radius. high: kappa of the last point. step: distance of points in kappa.
+    count: number of points (groups,).
+    """
+
+    def __init__(self, lines: _Lines) -> None:
+        self.rings = _groups(lines)
+        self.leader = np.cumsum(self.rings) - self.rings
+        leader, rate = self.leader, np.repeat(lines.kappa_rate[self.leader], self.rings)
+        self.stretch = np.where(np.repeat(self.rings, self.rings) > 1, lines.rho * rate, 1.0)
+        self.on_radii, self.on_nodes = lines.on_radii[leader], lines.on_nodes[leader]
+        self.first, last = np.minimum.reduceat(lines.first, leader), np.maximum.reduceat(lines.last, leader)
+        low = np.minimum.reduceat(self.stretch * lines.low, leader)
+        self.high = np.maximum.reduceat(self.stretch * lines.high, leader)
+        between, self.step = _steps(low, self.high, lines.rate[leader])
+        on_nodes = np.where(self.on_nodes, lines.wavelengths[leader], between)
+        self.count = np.where(self.on_radii, last + 1 - self.first, on_nodes)
+
+
+def counts(
+    radius_per_um: Array, s_nodes: int, s_max_per_um: float, rho: Array, quadratures: RingQuadratures
+) -> tuple[int, int]:
+    """Counts the points that `choose` would make, of all groups and of all rings; the parameters are the same."""
+    groups = _Groups(_Lines(radius_per_um, s_nodes, s_max_per_um, rho, quadratures))
+    return int(groups.count.sum()), int(groups.rings @ groups.count)
+
+
 def choose(
     radius_per_um: Array, s_nodes: int, s_max_per_um: float, rho: Array, quadratures: RingQuadratures
 ) -> LinePoints:
@@ -98,27 +129,17 @@ def choose(
     rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. quadratures: wavelengths of every ring.
     Returns the points of every group of rings; docs/spectral_operator.md derives them.
     """
-    lines = _Lines(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
-    rings = _groups(lines)
-    leader = np.cumsum(rings) - rings
-    stretch = np.where(np.repeat(rings, rings) > 1, rho * np.repeat(lines.kappa_rate[leader], rings), 1.0)
-    on_radii, on_nodes = lines.on_radii[leader], lines.on_nodes[leader]
-    first, last = np.minimum.reduceat(lines.first, leader), np.maximum.reduceat(lines.last, leader)
-    low = np.minimum.reduceat(stretch * lines.low, leader)
-    high = np.maximum.reduceat(stretch * lines.high, leader)
-    between, step = _steps(low, high, lines.rate[leader])
-    count = np.where(on_radii, last + 1 - first, np.where(on_nodes, quadratures.count[leader], between))
-
-    begin = np.cumsum(count) - count
-    group = np.repeat(np.arange(len(rings)), count)
+    of = _Groups(_Lines(radius_per_um, s_nodes, s_max_per_um, rho, quadratures))
+    begin = np.cumsum(of.count) - of.count
+    group = np.repeat(np.arange(len(of.rings)), of.count)
     i = np.arange(len(group)) - begin[group]
-    up = count[group] - 1 - i
-    kappa, of_rho = high[group] - up * step[group], rho[leader][group]
-    nodes, on = on_nodes[group], on_radii[group]
-    kappa[nodes] = 1.0 / quadratures.lambda_um[(quadratures.first[leader][group] + up)[nodes]]
-    place = np.where(on, first[group] + i, _first_radius(radius_per_um, of_rho * kappa))
+    up = of.count[group] - 1 - i
+    kappa, of_rho = of.high[group] - up * of.step[group], rho[of.leader][group]
+    nodes, on = of.on_nodes[group], of.on_radii[group]
+    kappa[nodes] = 1.0 / quadratures.lambda_um[(quadratures.first[of.leader][group] + up)[nodes]]
+    place = np.where(on, of.first[group] + i, _first_radius(radius_per_um, of_rho * kappa))
     kappa[on] = radius_per_um[place[on]] / of_rho[on]
-    return LinePoints(kappa, place, begin, count, rings, on_radii, on_nodes, stretch)
+    return LinePoints(kappa, place, begin, of.count, of.rings, of.on_radii, of.on_nodes, of.stretch)
 
 
 def _groups(lines: _Lines) -> np.ndarray:

@@ -41,6 +41,14 @@ def build(power: PolarPowerSpectrum) -> SpectralTable:
     return SpectralTable(values.astype(np.float32), power)
 
 
+def building_bytes(power_spectrum_bytes: int) -> int:
+    """Computes the memory in which `build` works, bytes, from the size of E.
+
+    E in another order, its terms in s, their transform and its quotient (complex), and the way back in float64.
+    """
+    return 8 * power_spectrum_bytes
+
+
 def look_up(table: SpectralTable, uvw: Array, lambda_nm: Array) -> Array:
     """Computes I_lambda of directions and wavelengths.
 

@@ -4,19 +4,17 @@ docs/spectral_operator.md derives the operator.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import spectral_operator
+from pipeline import resources
 from pipeline.arrays import Array
-from pipeline.errors import AccuracyError
 from pipeline.optics.brdf import grey
 from pipeline.tables.polar import line_points
 from pipeline.tables.polar.quadrature import RingQuadratures
-
-_MOST_BYTES = 2**32  # size of the weights over s of all rings: heights of 10 um need 2 GiB for the default window
-
 
 # computes R (..., L), the factor inside the spectral integral, from wavelengths (L,), nm, and cosines of half angles
 # (...,)
@@ -38,21 +36,85 @@ def integrate(
     1/um. s_max_per_um: end of the interval of its nodes in s, 1/um.
     rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. quadratures: their wavelengths and weights.
     w_terms: number of Chebyshev terms in |w|, a multiple of 4. reflectance: R.
-    Returns Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths). Raises AccuracyError if
+    Returns Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths). Raises ResourceError if
     the weights over s do not fit into memory. See docs/spectral_operator.md.
     """
     s_nodes = power.shape[2]
     points = line_points.choose(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
-    need = 4 * len(points.place) * s_nodes * w_terms
-    if need > _MOST_BYTES:
-        raise AccuracyError(
-            f"the spectral integral of these heights needs {need / 2**30:.1f} GiB, more than the "
-            f"{_MOST_BYTES >> 30} GiB allowed. Lower the heights (a scan's outliers: surface.clip_percentile) or "
-            "raise accuracy.delta_e."
-        )
+    resources.require(
+        "the weights of the spectral integral",
+        4 * len(points.place) * s_nodes * w_terms,
+        "lower the heights (a scan's outliers: surface.clip_percentile) or raise accuracy.delta_e",
+    )
     reflected = at_nodes(reflectance, rho, spectral_operator.group_w(rho, points, w_terms), quadratures)
     terms = spectral_operator.integrate(power, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
     return terms.reshape(len(rho), 3, w_terms, -1)
+
+
+@dataclass(frozen=True)
+class IntegralSize:
+    """The size of a spectral integral, known before its table is made.
+
+    points, ring_points: numbers of interpolation points (`line_points.counts`). wavelengths: of all rings together.
+    longest: of one ring. rings, s_nodes, w_terms, azimuths: as in `integrate`.
+    """
+
+    points: int
+    ring_points: int
+    wavelengths: int
+    longest: int
+    rings: int
+    s_nodes: int
+    w_terms: int
+    azimuths: int
+
+    @property
+    def table_bytes(self) -> int:
+        """Bytes of the result, which becomes the table."""
+        return 4 * 3 * self.rings * self.w_terms * self.azimuths
+
+    @property
+    def weights_bytes(self) -> int:
+        """Bytes of the operator, on the device."""
+        numbers = spectral_operator.operator_numbers(
+            self.points, self.ring_points, self.rings, self.s_nodes, self.w_terms
+        )
+        return 4 * sum(numbers)
+
+    def arrays(self, *, metal: bool = False) -> resources.Arrays:
+        """Lists the arrays of `integrate`.
+
+        The reflectance exists here and on the device. Matrices between the nodes in |w| are made in float64 and
+        copied as float32. A metal's reflectance is computed for all rings of one quadrature, in four complex arrays.
+        """
+        fresnel = (4 * 16 + 8) * self.w_terms * min(self.wavelengths, self.rings * self.longest) if metal else 0
+        return {
+            "table": self.table_bytes,
+            "weights of the spectral integral": self.weights_bytes,
+            "reflectance of the rings": 2 * 4 * self.wavelengths * self.w_terms + fresnel,
+            "matrices in |w|": (3 * 8 + 2 * 4) * self.rings * self.w_terms**2,
+        }
+
+    @property
+    def seconds(self) -> float:
+        """Estimates the time of `integrate`: E over s at the points, and then the wavelengths of all rings."""
+        sums = self.points * self.s_nodes + 3 * self.ring_points
+        return resources.seconds(float(sums) * self.w_terms * self.azimuths)
+
+
+def size(
+    radius_per_um: Array,
+    s_nodes: int,
+    s_max_per_um: float,
+    rho: Array,
+    quadratures: RingQuadratures,
+    w_terms: int,
+    azimuths: int,
+) -> IntegralSize:
+    """Computes the size of a spectral integral; the parameters are those of `integrate`, with the azimuths of E."""
+    counts = line_points.counts(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
+    wavelengths, longest = int(quadratures.count.sum()), int(quadratures.count.max())
+    return IntegralSize(*counts, wavelengths, longest, len(rho), s_nodes, w_terms, azimuths)
 
 
 def at_nodes(reflectance: Reflectance, rho: Array, w: Array, quadratures: RingQuadratures) -> NDArray[np.float32]:

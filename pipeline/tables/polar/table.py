@@ -86,7 +86,7 @@ def build(
 
     power: E. rings: those of the table. quadratures: wavelengths and weights of light and observer on every ring.
     w_terms: number of Chebyshev terms in |w|. reflectance: R inside the integral.
-    Raises AccuracyError if the spectral integral does not fit into memory.
+    Raises ResourceError if the spectral integral does not fit into memory.
     """
     rho = rings.rho()
     of = power.values, power.radius_per_um, power.s_max_per_um

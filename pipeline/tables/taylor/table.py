@@ -7,18 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import windowed_dft
+from pipeline import resources
 from pipeline.arrays import Array
-from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.dft_stack import Stack, StackSize
 from pipeline.diffraction.upload import upload
-from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import Quadrature
 from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.tables.taylor import grid
-
-_MOST_BYTES = 4 * 2**30
 
 
 @dataclass(frozen=True)
@@ -98,9 +96,13 @@ def build(
     stack: the Taylor stack. quadrature: wavelengths and weights of light, observer and material.
     resolution: odd number of nodes along each axis. power: the exponent a of the grid.
     scene: lights and views, None for all. progress: called with the share done.
-    Raises AccuracyError if the table does not fit into memory, and DeviceError if no device works.
+    Raises ResourceError if the table does not fit into memory, and DeviceError if no device works.
     """
-    _check_memory(resolution, 2 * stack.terms - 1)
+    resources.require(
+        f"{2 * stack.terms - 1} tables of {resolution} x {resolution} nodes",
+        values_bytes(resolution, stack.terms),
+        "lower table.resolution or raise table.tolerance (fewer terms)",
+    )
     u = grid.nodes(resolution, power)
     computed = reachable_nodes(u, scene)
     half_plane = (u > 0.0) | ((u == 0.0) & (u[:, None] >= 0.0))
@@ -154,13 +156,33 @@ def at_directions(stack: Stack, quadrature: Quadrature, uvw: Array) -> Array:
     return sum_powers(node_values(stack, quadrature, turn[:, None] * uvw[:, :2]), turn * uvw[:, 2])
 
 
-def _check_memory(resolution: int, powers: int) -> None:
-    need = 4 * resolution**2 * 3 * powers
-    if need > _MOST_BYTES:
-        raise AccuracyError(
-            f"{powers} tables of {resolution} x {resolution} nodes need {need / 2**30:.1f} GiB, more than the "
-            f"{_MOST_BYTES / 2**30:.0f} GiB allowed. Lower table.resolution or raise table.tolerance (fewer terms)."
-        )
+def values_bytes(resolution: int, terms: int) -> int:
+    """Computes the size of the tables I_p of a stack of so many terms, bytes."""
+    return 4 * resolution**2 * 3 * (2 * terms - 1)
+
+
+def building_arrays(resolution: int, terms: int, coefficients: StackSize) -> resources.Arrays:
+    """Lists the arrays of `build`: the tables, the nodes of a half plane with their indices, and the device's.
+
+    terms: of the stack. coefficients: of the stack, whose terms are padded to whole vectors on the device.
+    """
+    nodes = resolution**2 // 2
+    return {
+        "tables I_p": values_bytes(resolution, terms),
+        "nodes": (2 + 3 * 8 + 4 * 8 + 4) * nodes,
+        "stack on the device": coefficients.stack_bytes(windowed_dft.LANES * -(-terms // windowed_dft.LANES), 8),
+        "tiles of nodes": windowed_dft.taylor_table_bytes(nodes, terms),
+    }
+
+
+def seconds(nodes: int, wavelengths: int, terms: int, coefficients: StackSize) -> float:
+    """Estimates the time of I_p at nodes: the coefficients under the window, of all terms, and their products.
+
+    Multiply-adds in double precision count twice.
+    """
+    reach_x, reach_y = coefficients.reach
+    gathered = (2 * reach_x + 1) * (2 * reach_y + 1) * 2 * terms
+    return resources.seconds(2.0 * nodes * wavelengths * (gathered + 3.0 * terms**2))
 
 
 def reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:

@@ -1,0 +1,217 @@
+"""Memory and time of every stage before it begins, and the refusal of those that exceed their limits."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from math import floor, log10
+from typing import Any
+
+from pipeline import layouts, resources
+from pipeline.config.models import Config
+from pipeline.errors import BakeError, ConfigError, ResourceError
+from pipeline.resources import Need, largest
+from pipeline.stages import bundle, render, surface, validate
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
+from pipeline.stages.stage import Summary
+from pipeline.surface import recipes
+from pipeline.surface.extent import Extent
+
+# keys that a refusal may propose to change, and the end of their range towards less work; those of a scan or of
+# another layout do not apply
+_WAYS_OUT: tuple[tuple[str, float], ...] = (
+    ("table.azimuths", 32),
+    ("table.rings", 8),
+    ("table.w_terms", 4),
+    ("table.resolution", 3),
+    ("table.step_nm", 50.0),
+    ("table.terms", 2),
+    ("surface.recipe.amplitude_um", 1e-3),
+    ("surface.recipe.height_um", 1e-3),
+    ("surface.recipe.depth_um", 1e-3),
+    ("surface.recipe.sigma_h_um", 1e-3),
+    ("surface.recipe.size_um", 1.0),
+    ("surface.recipe.pitch_um", 10.0),
+    ("render.size", 16),
+    ("coherence.sigma_um", 0.1),
+    ("accuracy.delta_e", 100.0),
+)
+_MULTIPLES = {"table.azimuths": 32, "table.w_terms": 4}
+_HALVINGS, _PROPOSED = 12, 2
+
+
+def needs(config: Config, made: Mapping[str, Summary]) -> dict[str, Need]:
+    """Computes what every stage needs, by name; none of a scan that no stage has read.
+
+    made: summaries of the stages whose artifacts exist. A plan of rings and azimuths that is not made is foreseen at
+    the grid where its search starts.
+    """
+    extent = extent_of(config, made)
+    return {} if extent is None else _needs(config, extent, made)
+
+
+def extent_of(config: Config, made: Mapping[str, Summary]) -> Extent | None:
+    """Returns samples and heights of a config's surface; None for a scan that was not read."""
+    if "surface" in made:
+        return surface.extent_in(made["surface"])
+    return None if config.surface.recipe is None else recipes.extent(config.surface.recipe)
+
+
+def _needs(config: Config, extent: Extent, made: Mapping[str, Summary]) -> dict[str, Need]:
+    layout = layouts.of(config.table)
+    foreseen = Foreseen(config, extent, made)
+    sizes = layout.sizes(foreseen)
+    return {
+        "surface": surface.need(config.surface, extent, config.light.lambda_min_nm),
+        layout.transform.name: sizes.transform,
+        layout.table.name: sizes.table,
+        layout.textures.name: _textures(foreseen, sizes),
+        "render": render.need(foreseen, sizes),
+        "validate": validate.need(foreseen, sizes),
+        "bundle": bundle.need(foreseen, sizes),
+    }
+
+
+def _textures(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
+    """Computes memory and time of the stage "textures": the table, the exact reference, and the textures."""
+    held = foreseen.held(transform=sizes.transform_bytes)
+    kept = {**spare(sizes.freed_bytes), **heap(sizes.transform_bytes, sizes.table_bytes)}
+    if not sizes.textures.arrays:
+        return Need({**base("textures"), **held, **kept})
+    table = {"table": sizes.table_bytes}
+    arrays = largest(
+        foreseen.reading(**table),
+        {**table, **foreseen.reference.making()},
+        {**table, "reference": foreseen.reference.nbytes, **sizes.textures.arrays},
+    )
+    return Need({**base("textures"), **held, **kept, **arrays}, sizes.textures.seconds)
+
+
+def require_memory(config: Config, made: Mapping[str, Summary], to_do: Iterable[str], largest_buffer: int) -> None:
+    """Raises ResourceError where a stage to do needs more memory or time than is allowed, with keys that mend it.
+
+    to_do: names of the stages. largest_buffer: bytes that the device holds in one array.
+    """
+    found, limit, names = needs(config, made), resources.limit(), list(to_do)
+    seconds = sum(found[name].seconds for name in names if name in found)
+    if seconds > resources.LONGEST_S:
+        raise ResourceError(
+            f"{config.name}: this would take about {seconds / 3600:.3g} h, more than "
+            f"{resources.LONGEST_S / 3600:g} h" + _remedy(config, made, _ends)
+        )
+    for stage in names:
+        if stage not in found:
+            continue
+        need = found[stage]
+        if need.bytes > limit.bytes:
+            biggest = max(need.arrays, key=lambda name: need.arrays[name])
+            raise ResourceError(
+                f"{config.name}: stage {stage} needs {resources.in_words(need.bytes)} at its peak "
+                f"({resources.in_words(need.arrays[biggest])} of it for: {biggest}), more than the "
+                f"{resources.in_words(limit.bytes)} of {limit.source}"
+                + _remedy(config, made, lambda all_: all(all_[name].bytes <= limit.bytes for name in names))
+            )
+        if need.buffer > largest_buffer:
+            raise ResourceError(
+                f"{config.name}: stage {stage} needs an array of {resources.in_words(need.buffer)}, and the device "
+                f"holds no more than {resources.in_words(largest_buffer)} in one"
+                + _remedy(config, made, lambda all_: all(all_[name].buffer <= largest_buffer for name in names))
+            )
+
+
+def require_an_end(config: Config, source: str) -> None:
+    """Raises ConfigError where the whole bake of a recipe would take longer than an hour on this machine.
+
+    source: name of the config, for the message.
+    """
+    found = needs(config, {})
+    if _ends(found):
+        return
+    seconds = sum(need.seconds for need in found.values())
+    ways = list(_ways_out(config, {}, _ends))
+    key = ways[0][0] if ways else "surface"
+    text = (
+        f"expected work of at most {resources.LONGEST_S / 3600:g} h, this would take about {seconds / 3600:.3g} h; "
+        + " or ".join(f"{key} = {value:g}" for key, value in ways)
+        + (" would end" if ways else "make the patch, the window or the heights smaller")
+    )
+    raise ConfigError(source, [(key, text)])
+
+
+def _ends(found: Mapping[str, Need]) -> bool:
+    """Whether the work of all stages takes no longer than what is allowed."""
+    return sum(need.seconds for need in found.values()) <= resources.LONGEST_S
+
+
+def _remedy(config: Config, made: Mapping[str, Summary], fits: Callable[[Mapping[str, Need]], bool]) -> str:
+    ways = [f"{key} = {value:g}" for key, value in _ways_out(config, made, fits)]
+    if not ways:
+        return "; use a machine with more, or a smaller scan"
+    return f"; {' or '.join(ways)} would fit"
+
+
+def _ways_out(
+    config: Config, made: Mapping[str, Summary], fits: Callable[[Mapping[str, Need]], bool]
+) -> Iterator[tuple[str, float]]:
+    """Yields keys with the value closest to the config's with which its needs fit, by halving in proportion."""
+    proposed = 0
+    for key, end in _WAYS_OUT:
+        value = _value(config, key)
+        if value is None or (value <= end) != (end in (50.0, 10.0, 100.0)) or value == end:
+            continue
+
+        def tried(number: float, key: str = key) -> bool:
+            # a plan that is made does not hold for other settings; the surface of a scan does
+            known = {name: made[name] for name in made if name == "surface" and config.surface.recipe is None}
+            try:
+                return fits(needs(_with(config, key, number), known))
+            except BakeError:
+                return False
+
+        good, bad = _rounded(key, end, value), value
+        if not tried(good):
+            continue
+        for _ in range(_HALVINGS):
+            middle = _rounded(key, (good * bad) ** 0.5, good)
+            if middle in (good, bad):
+                break
+            good, bad = (middle, bad) if tried(middle) else (good, middle)
+        yield key, good
+        proposed += 1
+        if proposed == _PROPOSED:
+            return
+
+
+def _value(config: Config, key: str) -> float | None:
+    """Returns the number of a key, of a pair the larger; None where the config has none."""
+    found: Any = config
+    for part in key.split("."):
+        found = getattr(found, part, None)
+    if key == "accuracy.delta_e" and found is None:
+        return config.budget_delta_e
+    if isinstance(found, tuple):
+        return float(max(found))
+    return float(found) if isinstance(found, int | float) else None
+
+
+def _with(config: Config, key: str, number: float) -> Config:
+    """Returns a config with another number for one key."""
+    *sections, last = key.split(".")
+    parents: list[Any] = [config]
+    for section in sections:
+        parents.append(getattr(parents[-1], section))
+    whole = isinstance(getattr(parents[-1], last), int)
+    changed: Any = int(number) if whole else number
+    for parent, name in zip(reversed(parents), reversed([*sections, last]), strict=True):
+        changed = parent.model_copy(update={name: changed})
+    renewed: Config = changed
+    return renewed
+
+
+def _rounded(key: str, number: float, towards: float) -> float:
+    """Rounds to two digits, or to what the key may be, towards another number."""
+    if key == "table.resolution":
+        return float(2 * (int(number) // 2) + 1)
+    if key in ("table.rings", "table.terms", "render.size"):
+        return float(int(number))
+    if key in _MULTIPLES:
+        return float(max(1, int(number) // _MULTIPLES[key]) * _MULTIPLES[key])
+    digit = 10.0 ** (floor(log10(number)) - 1)
+    return float(f"{round(number / digit) * digit:.3g}") if number != towards else number

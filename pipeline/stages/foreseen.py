@@ -1,0 +1,107 @@
+"""The values from which memory and time of the stages are computed before they begin."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from kernels.memory import MOST_SPARE_BYTES
+from pipeline.config.models import Config
+from pipeline.diffraction import reference
+from pipeline.optics.light import FINE_STEP_NM
+from pipeline.resources import MIB, Arrays, Need
+from pipeline.stages.session import kept_bytes
+from pipeline.stages.stage import Summary
+from pipeline.store.arrays import loading_bytes, saving_bytes
+from pipeline.surface import windows
+from pipeline.surface.extent import Extent
+
+# an interpreter with what each stage imports, the driver and its compiler. Measured with Python 3.11 and PoCL 3.1 on
+# a grating of 100 x 100 samples, in a process that compiles the kernels; another needs 145 MiB less
+_BASE_BYTES = {
+    "surface": 300 * MIB,
+    "power_spectrum": 325 * MIB,
+    "stack": 300 * MIB,
+    "table": 330 * MIB,
+    "textures": 335 * MIB,
+    "render": 335 * MIB,
+    "validate": 400 * MIB,
+    "bundle": 390 * MIB,
+}
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """A bake before its stages begin.
+
+    config: the config. extent: samples and heights of its surface. made: summaries of the stages that are made.
+    """
+
+    config: Config
+    extent: Extent
+    made: Mapping[str, Summary]
+
+    @property
+    def windows(self) -> int:
+        """Number of positions of the coherence window."""
+        if not self.config.table.averages_windows:
+            return 1
+        return windows.count(self.extent.size_um, self.config.coherence)
+
+    @property
+    def wavelengths(self) -> int:
+        """Number of wavelengths of the exact reference."""
+        light = self.config.light
+        return 1 if light.is_line else round((light.range_nm[1] - light.range_nm[0]) / FINE_STEP_NM) + 1
+
+    @cached_property
+    def reference(self) -> reference.ReferenceSize:
+        """Size of the exact reference."""
+        sigma_um, lambda_min_nm = self.config.coherence.sigma_um, self.config.light.lambda_min_nm
+        return reference.size(self.extent, sigma_um, lambda_min_nm, self.windows)
+
+    def reading(self, **objects: int) -> Arrays:
+        """Lists what the first stage of several holds while it reads objects that the session did not keep."""
+        return {
+            f"reading of the {name}": loading_bytes(size) for name, size in objects.items() if not kept_bytes(size)
+        }
+
+    def held(self, **objects: int) -> Arrays:
+        """Lists what the session holds between stages: of objects by size in bytes, those that are kept."""
+        height_field = kept_bytes(self.extent.bytes)
+        return {"height field": height_field, **{name: kept_bytes(size) for name, size in objects.items()}}
+
+
+@dataclass(frozen=True)
+class LayoutSizes:
+    """What the stages of a layout need.
+
+    transform, table: of these stages. transform_bytes: of the transform, if the session holds it.
+    table_bytes: of the table. freed_bytes: of arrays of both stages that the device's pool may keep.
+    textures: of this stage, in addition to the table. stored_bytes: of the textures, 0 where they are the table.
+    study: of the curves of `validate`, in addition to the table. prepared: of a bundle's images, likewise.
+    """
+
+    transform: Need
+    table: Need
+    transform_bytes: int
+    table_bytes: int
+    freed_bytes: int
+    textures: Need
+    stored_bytes: int
+    study: Need
+    prepared: Need
+
+
+def base(stage: str) -> Arrays:
+    """Returns the memory of the process itself in a stage."""
+    return {"interpreter, driver, kernels": _BASE_BYTES[stage]}
+
+
+def spare(*freed: int) -> Arrays:
+    """Returns the memory that the device's pool keeps of arrays that were freed."""
+    return {"memory to be used again": min(MOST_SPARE_BYTES, sum(freed))}
+
+
+def heap(*written: int) -> Arrays:
+    """Returns the memory that the threads which wrote arrays keep: their blocks are too small to be given back."""
+    return {"heaps of threads": saving_bytes(max(written))}

@@ -1,0 +1,163 @@
+"""Memory and time of the polar layout's stages, from the sizes of their arrays."""
+
+from dataclasses import replace
+from math import sqrt
+
+from pipeline import resources
+from pipeline.accuracy.checks import RANDOM_DIRECTIONS
+from pipeline.bundle import polar_storage
+from pipeline.diffraction import dft_stack
+from pipeline.diffraction import power_spectrum as spectrum
+from pipeline.diffraction.polar_grid import Rings
+from pipeline.resources import Arrays, Need, largest
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, spare
+from pipeline.stages.polar import power_spectrum
+from pipeline.store.arrays import loading_bytes, saving_bytes
+from pipeline.tables.planning import plan
+from pipeline.tables.planning.grid_search import Grids
+from pipeline.tables.polar import spectral
+from pipeline.tables.polar.bake import PolarBake
+
+# tables that the search for a grid measures, and tables of the curves that `validate` shows
+_SEARCHED, _STUDIED = 6, 15
+# terms in |w| of the largest of these curves
+_STUDIED_W_TERMS = 12
+
+
+def sizes(foreseen: Foreseen) -> LayoutSizes:
+    """Computes what the stages need: from the plan where it is made, else from the grid at which its search starts.
+
+    The search may go on to a larger grid; it then asks for its memory again.
+    """
+    config, extent = foreseen.config, foreseen.extent
+    layout = power_spectrum.layout_of(config)
+    bake, rings, azimuths = _grid(foreseen)
+    integral = bake.integral_size(rings, azimuths)
+    metal = config.material.fresnel == "conductor"
+    e_bytes, table = bake.power_spectrum_bytes(azimuths), integral.arrays(metal=metal)
+    chosen = dft_stack.size(extent, bake.sigma_um, float(bake.radius_per_um[-1]), bake.tolerance)
+    filled = spectrum.filled_terms(bake.terms)
+    stack = chosen.stack_bytes(filled, 4)
+    e_seconds = _gather_seconds(bake, azimuths, chosen.reach) * foreseen.windows
+    searched = _SEARCHED if "auto" in (layout.rings, layout.azimuths) else 0
+    # the planner's spectral integral is that of a grey surface; a grid that the config sets is not tried
+    tried = integral.arrays() if searched else {}
+    trial = Need(
+        {**base("power_spectrum"), **_transforming(foreseen, bake, azimuths, chosen, tried)},
+        resources.seconds(chebyshev_work(chosen, filled) * foreseen.windows)
+        + e_seconds * (1 + searched / 2)
+        + integral.seconds * searched,
+        max(stack, e_bytes, *([integral.table_bytes, integral.weights_bytes] if searched else [])),
+    )
+    reference = foreseen.reference
+    reading = {"reading of the power spectrum": loading_bytes(e_bytes)}
+    holding = {**base("table"), **foreseen.held(), "power spectrum": e_bytes, "table": integral.table_bytes}
+    between = chosen.chebyshev_bytes(filled, 4)["terms between two transforms"]
+    freed_bytes = stack + between + (e_bytes if searched else 0) + sum(tried.values()) + integral.weights_bytes
+    freed = spare(freed_bytes)
+    certified = {**reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material), **freed}
+    spectral_form = layout.form == "spectral"
+    needed = largest(
+        {**base("table"), **foreseen.held(), **reading, **freed},
+        {**holding, **table, **freed},
+        {**holding, **reference.making(), **freed},
+        {**holding, **certified},
+        {**holding, "reference": reference.nbytes, "writing": saving_bytes(integral.table_bytes), **freed},
+        {
+            **holding,
+            "reference": reference.nbytes,
+            "spectral form": spectral.building_bytes(e_bytes) if spectral_form else 0,
+            **freed,
+        },
+    )
+    table_need = Need(
+        needed,
+        integral.seconds + reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths),
+        max(integral.table_bytes, integral.weights_bytes, reference.stack.stack_bytes(reference.terms, 8)),
+    )
+    publish = config.publish
+    answering = reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material)
+    is_whole = polar_storage.is_whole(config)
+    choosing = {"textures": polar_storage.choosing_bytes(integral.table_bytes, bake.w_terms, publish), **answering}
+    return LayoutSizes(
+        transform=trial,
+        table=table_need,
+        transform_bytes=e_bytes,
+        table_bytes=integral.table_bytes,
+        freed_bytes=freed_bytes + reference.stack.stack_bytes(reference.terms, 8),
+        study=_study(bake, rings, azimuths, metal=metal),
+        textures=Need({} if is_whole else choosing, reference.seconds(2 * RANDOM_DIRECTIONS, foreseen.wavelengths)),
+        # as stored in half floats, and as read back
+        stored_bytes=0 if is_whole else 3 * integral.table_bytes // 2,
+        # an image has four channels, here and in OpenEXR
+        prepared=Need({"image": 2 * 4 * 4 * rings.count * azimuths}),
+    )
+
+
+def _grid(foreseen: Foreseen) -> tuple[PolarBake, Rings, int]:
+    """Returns numbers of terms and nodes, the rings, and the number of azimuths: planned, or foreseen."""
+    config = foreseen.config
+    layout, budget = power_spectrum.layout_of(config), power_spectrum.budget(config)
+    if "power_spectrum" in foreseen.made:
+        planned = power_spectrum.plan_in(foreseen.made["power_spectrum"])
+        return planned.bake(config.radiometry, budget, layout), planned.rings, planned.azimuths.count
+    bake = plan.numbers(
+        foreseen.extent.half_range_um, config.coherence.sigma_um, config.light, config.scene, budget, layout
+    )
+    grids = Grids(bake, layout, config.budget_delta_e)
+    rings, azimuths = grids.first()
+    return bake, grids.rings(rings), azimuths
+
+
+def _transforming(
+    foreseen: Foreseen, bake: PolarBake, azimuths: int, chosen: dft_stack.StackSize, table: Arrays
+) -> Arrays:
+    """Lists the arrays of the stage "power_spectrum" at its peak."""
+    filled, e_bytes = spectrum.filled_terms(bake.terms), bake.power_spectrum_bytes(azimuths)
+    stack = chosen.chebyshev_bytes(filled, 4)
+    between = stack["terms between two transforms"]
+    always = {
+        **foreseen.held(),
+        "height fields of all windows": foreseen.windows * foreseen.extent.bytes,
+        "stack": stack["stack"],
+    }
+    # positions, radii, azimuths and light of all coefficients
+    scattering = 7 * 8 * chosen.kept.shape[0] * chosen.kept.shape[1]
+    freed = spare(between, sum(table.values()))
+    several = {"power spectrum of another window": e_bytes, "stack of another window": sum(stack.values())}
+    return largest(
+        {**always, **stack},
+        {**always, "scattered light": scattering, **spare(between)},
+        {**always, "power spectrum": e_bytes, **table, **spare(between)},
+        {**always, "power spectrum": e_bytes, **(several if foreseen.windows > 1 else {}), **freed},
+        {
+            **always,
+            "power spectrum": e_bytes,
+            "contrast": spectrum.contrast_bytes(azimuths, len(bake.radius_per_um)),
+            **freed,
+        },
+        {**always, "power spectrum": e_bytes, "writing": saving_bytes(e_bytes), **freed},
+    )
+
+
+def chebyshev_work(chosen: dft_stack.StackSize, terms: int) -> float:
+    """Counts the multiply-adds of a stack: two steps along either axis, each of about the root of its samples."""
+    ny, nx = chosen.samples
+    rows, columns = chosen.kept.shape
+    return terms * (ny * (nx + columns) * sqrt(nx) + 2.0 * columns * (ny + rows) * sqrt(ny))
+
+
+def _gather_seconds(bake: PolarBake, azimuths: int, reach: tuple[int, int]) -> float:
+    """Estimates the time of E on half of the azimuths: the coefficients under the window, then the nodes in s."""
+    taps = (2 * reach[0] + 1) * (2 * reach[1] + 1)
+    each = 2.0 * bake.terms * (taps + bake.s_nodes)
+    return resources.seconds(0.5 * azimuths * len(bake.radius_per_um) * each)
+
+
+def _study(bake: PolarBake, rings: Rings, azimuths: int, *, metal: bool) -> Need:
+    """Returns the need of the curves: E thinned to half of its azimuths, or tables with other numbers."""
+    e_bytes = bake.power_spectrum_bytes(azimuths)
+    other = replace(bake, w_terms=max(bake.w_terms, _STUDIED_W_TERMS)).integral_size(rings, azimuths)
+    arrays = {name.replace("table", "another table"): size for name, size in other.arrays(metal=metal).items()}
+    thinned = {"power spectrum, thinned": e_bytes + e_bytes // 2}
+    return Need(largest(arrays, thinned), _STUDIED * other.seconds, max(other.table_bytes, other.weights_bytes))
