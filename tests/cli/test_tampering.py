@@ -1,6 +1,7 @@
 """Changed files are named and never used, and the remedy in the message works."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -139,6 +140,35 @@ def test_an_unchanged_bundle(baked: Tool) -> None:
     assert (result.code, result.stderr) == (0, "")
     assert result.stdout == f"{baked.bundle()}: unchanged\n"
     assert baked("verify", baked.bundle(), "--json").json == {"bundle": str(baked.bundle()), "faults": []}
+
+
+def test_a_renamed_bundle(copy: Tool) -> None:
+    digest = copy.bundle().name.rpartition("+")[2]
+    moved = copy.bundle().rename(copy.folder / "elaphe")
+    result = copy("verify", moved)
+    assert (result.code, result.stderr) == (0, "")
+    assert result.stdout == (
+        f"{moved}: all files match SHA256SUMS; the folder was renamed, so that its name no longer carries the digest "
+        f"{digest}\n"
+    )
+    expected = {"bundle": str(moved), "faults": [], "renamed": True, "digest": digest}
+    assert copy("verify", moved, "--json").json == expected
+    (copy.folder / "d.csv").write_text("0,0,10,0\n", encoding="utf-8")
+    assert copy("eval", moved, "--directions", "d.csv").code == 0
+
+
+@pytest.mark.parametrize("how", ["pipe", "deep", "surrogate"])
+def test_a_manifest_from_elsewhere(copy: Tool, how: str) -> None:
+    manifest = copy.bundle() / "manifest.json"
+    manifest.unlink()
+    if how == "pipe":
+        os.mkfifo(manifest)
+    else:
+        manifest.write_text("[" * 100_000 if how == "deep" else '{"name": "\\ud800"}', encoding="utf-8")
+    for command in (("inspect", copy.bundle()), ("verify", copy.bundle()), ("run", "small.toml")):
+        result = copy(*command)
+        assert result.code == 6, command
+        assert "manifest.json" in result.stderr
 
 
 def test_a_folder_that_is_no_bundle(tool: Tool) -> None:

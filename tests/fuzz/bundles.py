@@ -201,7 +201,7 @@ def make_a_bomb(folder: Path, rng: random.Random) -> None:
     images = manifest["tables"] if rng.random() < 0.7 else manifest["maps"]
     for image in images[: rng.choice([1, len(images)])]:
         names = sorted(image["channels"])
-        (folder / image["file"]).write_bytes(_zeros(names, width, height, image["pixel_type"]))
+        (folder / image["file"]).write_bytes(zeros(names, width, height, image["pixel_type"]))
         if stated:
             image["width"], image["height"] = width, height
     if stated and images is manifest["tables"]:
@@ -212,7 +212,7 @@ def make_a_bomb(folder: Path, rng: random.Random) -> None:
     _write_manifest(folder, manifest)
 
 
-def _zeros(names: list[str], width: int, height: int, pixel_type: str) -> bytes:
+def zeros(names: list[str], width: int, height: int, pixel_type: str) -> bytes:
     kind, size = {"half": (1, 2), "float": (2, 4)}[pixel_type]
     channels = b"".join(name.encode() + b"\0" + struct.pack("<iIii", kind, 0, 1, 1) for name in names) + b"\0"
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
