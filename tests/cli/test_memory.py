@@ -37,7 +37,7 @@ def config(kind: str, size_um: float, **sections: Any) -> dict[str, Any]:
 SMALL_TAYLOR = {"layout": "taylor", "resolution": 41}
 CASES: dict[str, tuple[dict[str, Any], str]] = {
     "small": (config("sinusoid", 10.0), "bundle"),
-    "paper, small": (config("sinusoid", 10.0, table=SMALL_TAYLOR), "bundle"),
+    "paper, small": (config("sinusoid", 10.0, table=SMALL_TAYLOR), "render"),
     "snake": (config("elaphe", 65.0), "table"),
     "half, few textures": (config("xenopeltis", 40.0, publish={"precision": "half", "textures": 1}), "bundle"),
     "scene": (
@@ -56,7 +56,7 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "large map": (config("mirror", 20.0, render={"size": 2048}), "render"),
     "nine windows": (config("gaussian", 80.0, coherence={"sigma_um": 10.0}), "table"),
-    "large patch": (config("elaphe", 150.0, coherence={"sigma_um": 5.0, "windows": "centre"}), "surface"),
+    "large patch": (config("elaphe", 110.0, coherence={"sigma_um": 5.0, "windows": "centre"}), "surface"),
 }
 
 
