@@ -143,14 +143,22 @@ def _print_result(result: dict[str, Any]) -> None:
 def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_json: bool) -> None:
     """List what `run` would do: each stage, cached or to do, the reason, its memory and its cost. Computes nothing.
 
-    The peak is that of the whole process. With a limit, a stage that exceeds it is refused as `run` refuses it. What
-    a scan needs is known once `run --until surface` has read it.
+    The peak is that of the whole process; that of a table whose grid is still to be searched for may grow. Where
+    `run` would refuse a stage for its memory, so does this, with exit code 4.
     """
-    store = console.open_store(store_root)
-    plans = {config.name: _plan(config, store) for config in load_all(config_paths)}
+    from pipeline.stages import run
+
+    store, loaded = console.open_store(store_root), load_all(config_paths)
+    plans = {config.name: _plan(config, store) for config in loaded}
     if as_json:
         console.print_json(plans)
-        return
+    else:
+        _print_plans(plans)
+    for config in loaded:
+        run.require_memory(config, run.plan(config, store), store)
+
+
+def _print_plans(plans: dict[str, list[dict[str, Any]]]) -> None:
     for name, steps in plans.items():
         console.say(f"{name}:")
         rows = [[s["stage"], s["state"], _size(s["peak_bytes"]), s["cost"]] for s in steps]

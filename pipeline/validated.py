@@ -7,9 +7,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo
 
 # not strict, because TOML has arrays and no tuples
 Pair = Annotated[tuple[float, float], Field(strict=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # beyond these limits a unit is wrong; within them, no product of some of them overflows or vanishes
-Positive = Annotated[float, Field(ge=1e-12, le=1e12)]
-PositivePair = Annotated[tuple[Positive, Positive], Field(strict=False)]
+Magnitude = Annotated[float, Field(ge=1e-12, le=1e12)]
+MagnitudePair = Annotated[tuple[Magnitude, Magnitude], Field(strict=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 # a length on a surface, um, from an atom's to a hand's: what lies beyond is given in a wrong unit
 Length = Annotated[float, Field(ge=1e-4, le=1e5)]

@@ -10,6 +10,7 @@ from pipeline.errors import BakeError, ConfigError, ResourceError
 from pipeline.resources import Need, largest
 from pipeline.stages import bundle, render, surface, validate
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
+from pipeline.stages.session import kept_bytes
 from pipeline.stages.stage import Summary
 from pipeline.surface import recipes
 from pipeline.surface.extent import Extent
@@ -37,21 +38,22 @@ _MULTIPLES = {"table.azimuths": 32, "table.w_terms": 4}
 _HALVINGS, _PROPOSED = 12, 2
 
 
-def needs(config: Config, made: Mapping[str, Summary]) -> dict[str, Need]:
-    """Computes what every stage needs, by name; none of a scan that no stage has read.
+def needs(config: Config, made: Mapping[str, Summary], *, reads: bool = False) -> dict[str, Need]:
+    """Computes what every stage needs, by name; nothing of a scan that no stage has read.
 
     made: summaries of the stages whose artifacts exist. A plan of rings and azimuths that is not made is foreseen at
-    the grid where its search starts.
+    the grid where its search starts. reads: whether a scan that no stage has read is read here.
     """
-    extent = extent_of(config, made)
-    return {} if extent is None else _needs(config, extent, made)
-
-
-def extent_of(config: Config, made: Mapping[str, Summary]) -> Extent | None:
-    """Returns samples and heights of a config's surface; None for a scan that was not read."""
     if "surface" in made:
-        return surface.extent_in(made["surface"])
-    return None if config.surface.recipe is None else recipes.extent(config.surface.recipe)
+        return _needs(config, surface.extent_in(made["surface"]), made)
+    if config.surface.recipe is not None:
+        return _needs(config, recipes.extent(config.surface.recipe), made)
+    if not reads:
+        return {}
+    try:
+        return _needs(config, surface.field_of(config)[0].extent, made)
+    except BakeError:  # the stage that reads the scan will report it
+        return {}
 
 
 def _needs(config: Config, extent: Extent, made: Mapping[str, Summary]) -> dict[str, Need]:
@@ -73,9 +75,9 @@ def _textures(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     """Computes memory and time of the stage "textures": the table, the exact reference, and the textures."""
     held = foreseen.held(transform=sizes.transform_bytes)
     kept = {**spare(sizes.freed_bytes), **heap(sizes.transform_bytes, sizes.table_bytes)}
-    if not sizes.textures.arrays:
-        return Need({**base("textures"), **held, **kept})
     table = {"table": sizes.table_bytes}
+    if not sizes.textures.arrays:
+        return Need({**base("textures"), **held, **kept, "table": kept_bytes(sizes.table_bytes)})
     arrays = largest(
         foreseen.reading(**table),
         {**table, **foreseen.reference.making()},
@@ -84,10 +86,12 @@ def _textures(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     return Need({**base("textures"), **held, **kept, **arrays}, sizes.textures.seconds)
 
 
-def require_memory(config: Config, made: Mapping[str, Summary], to_do: Iterable[str], largest_buffer: int) -> None:
+def require_memory(
+    config: Config, made: Mapping[str, Summary], to_do: Iterable[str], largest_buffer: int | None
+) -> None:
     """Raises ResourceError where a stage to do needs more memory or time than is allowed, with keys that mend it.
 
-    to_do: names of the stages. largest_buffer: bytes that the device holds in one array.
+    to_do: names of the stages. largest_buffer: bytes that the device holds in one array; None for any number.
     """
     found, limit, names = needs(config, made), resources.limit(), list(to_do)
     seconds = sum(found[name].seconds for name in names if name in found)
@@ -108,7 +112,7 @@ def require_memory(config: Config, made: Mapping[str, Summary], to_do: Iterable[
                 f"{resources.in_words(limit.bytes)} of {limit.source}"
                 + _remedy(config, made, lambda all_: all(all_[name].bytes <= limit.bytes for name in names))
             )
-        if need.buffer > largest_buffer:
+        if largest_buffer is not None and need.buffer > largest_buffer:
             raise ResourceError(
                 f"{config.name}: stage {stage} needs an array of {resources.in_words(need.buffer)}, and the device "
                 f"holds no more than {resources.in_words(largest_buffer)} in one"

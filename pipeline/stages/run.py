@@ -68,14 +68,16 @@ def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
 
 
 def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
-    """Explains each step of a plan: why it is cached or to do, and its cost. Reads the records of the whole store.
+    """Explains each step of a plan: why it is cached or to do, its cost and its memory.
+
+    Reads the records of the whole store, and a scan that no stage has read.
 
     config: the config of the plan. steps: the plan.
     Returns one explanation per step.
     """
     earlier = store.artifacts()
     made = {step.stage.name for step in steps if not step.cached}
-    needs = forecast.needs(config, summaries(steps, store))
+    needs = forecast.needs(config, summaries(steps, store), reads=True)
     explanations = []
     for step in steps:
         last = _latest(earlier, step.stage.name, config.name)
@@ -114,7 +116,8 @@ def execute(
     none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
-    if any(step.stage.uses_device and not step.cached for step in steps):
+    uses_device = any(step.stage.uses_device and not step.cached for step in steps)
+    if uses_device:
         # a missing device is reported before any work; its driver loads while zarr is imported, which takes as long
         found = _Device()
         found.start()
@@ -124,7 +127,7 @@ def execute(
     session = Session()
     for step in steps:
         name, seconds = step.stage.name, None
-        require_memory(config, steps, store)
+        require_memory(config, steps, store, default_device().largest_bytes if uses_device else None)
         if store.has(name, step.key):
             store.touch(name, step.key)
         else:
@@ -164,17 +167,17 @@ class _Device(Thread):
             raise self._fault
 
 
-def require_memory(config: Config, steps: list[Step], store: Store) -> None:
+def require_memory(config: Config, steps: list[Step], store: Store, largest_buffer: int | None = None) -> None:
     """Raises ResourceError where a step that is to do needs more memory than is allowed, before it begins.
 
     Made artifacts tell the samples of a scan and the plan of a table; without them these are foreseen, as far as the
     config says.
+
+    largest_buffer: bytes that the device holds in one array; None where no device was looked for.
     """
     to_do = [step.stage.name for step in steps if not store.has(step.stage.name, step.key)]
     if to_do:
-        used = any(step.stage.uses_device for step in steps if step.stage.name in to_do)
-        buffer = default_device().largest_bytes if used else 2**62
-        forecast.require_memory(config, summaries(steps, store), to_do, buffer)
+        forecast.require_memory(config, summaries(steps, store), to_do, largest_buffer)
 
 
 def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:

@@ -4,6 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pipeline import resources
 from pipeline.accuracy import exact
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference
@@ -47,15 +48,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     progress("surface", 0.0)
-    scan = None
-    if config.surface.recipe is not None:
-        field = recipes.make(config.surface.recipe)
-    else:
-        from pipeline.surface.load import load_scan
-
-        field, record = load_scan(config.surface)
-        scan = asdict(record)
-    field, cleaning = condition(field, config.surface.levelling, config.surface.clip_percentile)
+    field, cleaning, scan = field_of(config)
     lambda_min = config.light.lambda_min_nm
     statistics = measure(field, config.coherence.sigma_um, lambda_min)
     x, y = field.coordinates_um()
@@ -79,6 +72,26 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
             *_warnings(statistics, config.coherence.sigma_um, lambda_min, is_scan=scan is not None),
         ],
     }
+
+
+def field_of(config: Config) -> tuple[HeightField, ConditioningRecord, dict[str, Any] | None]:
+    """Makes or reads the height field of a config and conditions it.
+
+    Returns the field, the changes that were made to it, and the record of a scan, None for a recipe.
+    Raises InputError for a scan that cannot be read or trusted, ResourceError for one that is too large to measure.
+    """
+    scan = None
+    if config.surface.recipe is not None:
+        field = recipes.make(config.surface.recipe)
+    else:
+        from pipeline.surface.load import load_scan
+
+        field, record = load_scan(config.surface)
+        scan = asdict(record)
+        ny, nx = field.shape
+        measuring = measuring_bytes(field.extent, config.light.lambda_min_nm)
+        resources.require(f"the statistics of {nx} x {ny} samples", measuring, "crop the scan")
+    return *condition(field, config.surface.levelling, config.surface.clip_percentile), scan
 
 
 def need(source: SurfaceSource, extent: Extent, lambda_min_nm: float) -> Need:

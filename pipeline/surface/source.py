@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pipeline.surface.recipes.parameters import Recipe
-from pipeline.validated import Finite, Pair, Positive, PositivePair, Validated, existing_file
+from pipeline.validated import Finite, Magnitude, MagnitudePair, Pair, Validated, existing_file
 
 Unit = Literal["pm", "nm", "um", "mm", "m"]
 
@@ -28,9 +28,9 @@ class SurfaceSource(Validated):
 
     path: str | None = None
     channel: str | None = None
-    pitch_um: Positive | PositivePair | None = None
+    pitch_um: Magnitude | MagnitudePair | None = None
     height_unit: Unit | None = None
-    height_range_um: Positive | None = None
+    height_range_um: Magnitude | None = None
     override_file_units: bool = False
     level: Literal["none", "plane", "quadratic", "rows"] | None = None
     clip_percentile: Pair | None = None
