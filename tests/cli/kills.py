@@ -66,7 +66,7 @@ def signalled(tool: Tool, config: Path, sent: signal.Signals, after_s: float, ca
     if took > ENDS_WITHIN_S and code != 0:
         counts.faults.append(f"{sent.name} after {after_s:.3f} s: {took:.1f} s until its end")
     lines = stderr.splitlines()
-    if code == 0 and finished:
+    if code == 0 and (finished or took < 0.2):
         counts.ended["had finished"] += 1
     elif (sent == signal.SIGKILL and code == -sent) or (
         code == 128 + sent and lines and lines[-1] == LINES[sent] and "Traceback" not in stderr
