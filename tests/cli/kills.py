@@ -75,7 +75,8 @@ def signalled(tool: Tool, config: Path, sent: signal.Signals, after_s: float, ca
     elif code == -sent and not lines:
         # the interpreter had not installed its handler
         counts.ended[f"{sent.name} before the interpreter ran"] += 1
-    elif "cli.entry" not in stderr and "cli/entry" not in stderr and "KeyboardInterrupt" in stderr and after_s < 0.5:
+    elif "in process\n" not in stderr and "KeyboardInterrupt" in stderr and after_s < 0.5:
+        # before the first instruction of cli/entry.py's function
         counts.ended[f"{sent.name} while the interpreter started"] += 1
     else:
         counts.faults.append(f"{sent.name} after {after_s:.3f} s: exit code {code}, {took:.1f} s, {stderr[-300:]!r}")
