@@ -129,7 +129,7 @@ def test_a_few_of_the_kills_of_make_kills(tmp_path: Path) -> None:
     counts = kills.Counts()
     kills.sweep(tmp_path, kills=2, seed=5, longest_s=3.0, counts=counts)
     for sent in (signal.SIGINT, signal.SIGTERM):
-        kills.interrupts(tmp_path, 4, sent, 1.2, counts)
+        kills.interrupts(tmp_path, 3, sent, 1.0, counts)
     assert counts.faults == []
 
 

@@ -118,7 +118,9 @@ class Tool:
         """Keys of the artifacts in the store by stage."""
         found: dict[str, list[str]] = {}
         for record in sorted(self.store.glob("*/*/artifact.json")):
-            found.setdefault(record.parents[1].name, []).append(record.parent.name)
+            # a run that was killed may leave a whole artifact under tmp, which is never read
+            if record.parents[1].name != "tmp":
+                found.setdefault(record.parents[1].name, []).append(record.parent.name)
         return found
 
 
