@@ -22,7 +22,7 @@ MIB = 2**20
 # without using it, which grows with the number of cores
 _RESERVED_BYTES, _RESERVED_BYTES_A_CORE = 900 * MIB, 150 * MIB
 # multiply-adds per second and core in single precision: a third of what the kernels reach with AVX2. Estimates are
-# right within a factor of some three
+# right within a factor of three for most stages, and of seven for the bundle
 MULTIPLY_ADDS_PER_S = 8e9
 # a bake of a snake takes seconds and one of a scan of 4096 x 4096 samples a minute: what takes longer than this has a
 # unit wrong

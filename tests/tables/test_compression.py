@@ -145,7 +145,7 @@ def test_the_envelope_narrows_the_range_and_changes_no_value() -> None:
 
 def snake_table(name: str) -> tuple[PolarTable, Array, Array, Array]:
     """A table of a scan with 140 x 1792 texels; uvw, C cos ti and exact XYZ of views at normal incidence."""
-    field, light, material, sigma = snake(name), Light(), Material(), 16.25
+    field, light, material, sigma = snake(name), Light(), Material(normalisation="relative"), 16.25
     radius = power_spectrum.radii(sigma, 2.0 / 0.38)
     stack = power_spectrum.chebyshev_stack(field, sigma, radius[-1], 16, 1e-5)
     power = power_spectrum.build(stack, Azimuths(1792, 0.87), radius, 380.0, 12)

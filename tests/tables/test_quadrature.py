@@ -17,7 +17,7 @@ LIGHT = Light()
 def test_outer_rings_have_more_wavelengths() -> None:
     """Few suffice near the mirror direction, many are needed at the rim; the estimate bounds the measured error."""
     rho, tolerance = Rings(40, 0.1).rho(), 1e-3
-    light = Radiometry(LIGHT, Material(), 16.25).integrand
+    light = Radiometry(LIGHT, Material(normalisation="relative"), 16.25).integrand
     rules = quadrature.choose(light, rho, 16.25, tolerance)
     assert np.all(np.diff(rules.count) >= 0)
     assert rules.count[0] <= 41
@@ -38,7 +38,7 @@ def test_outer_rings_have_more_wavelengths() -> None:
 
 def test_every_ring_integrates_white_exactly() -> None:
     """A step of 20 nm alone would err by 1 % in Z."""
-    light = Radiometry(LIGHT, Material(), 16.25).integrand
+    light = Radiometry(LIGHT, Material(normalisation="relative"), 16.25).integrand
     rules = quadrature.choose(light, Rings(40, 0.1).rho(), 16.25, 1e-3)
     white = light(0.05).weights.sum(axis=0)
     for first, count in zip(rules.first, rules.count, strict=True):
