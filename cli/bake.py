@@ -9,6 +9,7 @@ from cli import console, sources
 
 if TYPE_CHECKING:
     from pipeline.config.models import Config
+    from pipeline.stages.run import Step
 
 
 @click.command("run")
@@ -78,8 +79,10 @@ def _bake_until(loaded: "list[Config]", until: str, store_root: Path | None, as_
         return
     for result in results:
         found = [stage["summary"].get("certificate") for stage in result["stages"].values()]
-        for certificate in [certificate for certificate in found if certificate is not None][-1:]:
-            console.say(f"{result['name']}: {_certified(certificate)}")
+        certificates = [certificate for certificate in found if certificate is not None]
+        if certificates:
+            # the last one is of what a bundle holds
+            console.say(f"{result['name']}: {_certified(certificates[-1])}")
 
 
 def _certified(certificate: dict[str, Any]) -> str:
@@ -148,14 +151,15 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
     """
     from pipeline.stages import run
 
-    store, loaded = console.open_store(store_root), load_all(config_paths)
-    plans = {config.name: _plan(config, store) for config in loaded}
+    store = console.open_store(store_root)
+    planned = [(config, run.plan(config, store)) for config in load_all(config_paths)]
+    plans = {config.name: _explained(config, steps, store) for config, steps in planned}
     if as_json:
         console.print_json(plans)
     else:
         _print_plans(plans)
-    for config in loaded:
-        run.require_memory(config, run.plan(config, store), store)
+    for config, steps in planned:
+        run.require_memory(config, steps, store)
 
 
 def _print_plans(plans: dict[str, list[dict[str, Any]]]) -> None:
@@ -174,11 +178,10 @@ def _size(bytes_: int | None) -> str:
     return "unknown" if bytes_ is None else in_words(bytes_)
 
 
-def _plan(config: "Config", store: Any) -> list[dict[str, Any]]:
-    """Lists every stage."""
+def _explained(config: "Config", steps: "list[Step]", store: Any) -> list[dict[str, Any]]:
+    """Lists every stage of a plan."""
     from pipeline.stages import run
 
-    steps = run.plan(config, store)
     return [
         {
             "stage": step.stage.name,

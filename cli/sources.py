@@ -37,7 +37,7 @@ def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any)
 def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress: Any) -> Any:
     """Returns a function (wi, wr) -> XYZ, (n, 3) each, of a config, and bakes what it needs."""
     if exact:
-        artifact = _artifact(config, "surface", store_root, progress)
+        (artifact,) = _artifacts(config, ("surface",), store_root, progress)
         from pipeline.accuracy.exact import reference_evaluator
         from pipeline.stages import surface
 
@@ -46,7 +46,8 @@ def config_evaluator(config: Any, exact: bool, store_root: Path | None, progress
     from pipeline.stages.stage import Inputs
     from pipeline.tables.evaluate import interpolator
 
-    inputs = Inputs({name: _artifact(config, name, store_root, progress) for name in ("table", "textures")})
+    table, textures = _artifacts(config, ("table", "textures"), store_root, progress)
+    inputs = Inputs({"table": table, "textures": textures})
     return interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry, progress)
 
 
@@ -66,7 +67,7 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
     from pipeline.stages.polar import power_spectrum
     from pipeline.tables.polar import spectral
 
-    artifact = _artifact(config, "surface" if exact else "power_spectrum", store_root, progress)
+    (artifact,) = _artifacts(config, ("surface" if exact else "power_spectrum",), store_root, progress)
     if exact:
         reference = reference_of(surface.load(artifact), config, progress)
         return lambda wi, wr, lambda_nm: reference.power(uvw(wi, wr), lambda_nm)
@@ -74,14 +75,14 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
     return lambda wi, wr, lambda_nm: spectral.look_up(table, uvw(wi, wr), lambda_nm)
 
 
-def _artifact(config: Any, stage: str, store_root: Path | None, progress: Any) -> Any:
-    """Bakes a config up to a stage and returns that stage's artifact, checked."""
+def _artifacts(config: Any, stages: tuple[str, ...], store_root: Path | None, progress: Any) -> list[Any]:
+    """Bakes a config up to the last of these stages and returns their artifacts, checked."""
     from pipeline.stages import run
 
     store = console.open_store(store_root)
-    steps = run.plan(config, store, stage)
+    steps = run.plan(config, store, stages[-1])
     artifacts = run.execute(config, steps, store, progress, console.warning_reporter(config, store))
-    return store.open(stage, artifacts[stage].key)
+    return [store.open(stage, artifacts[stage].key) for stage in stages]
 
 
 def without_negative(xyz: Any, what: str) -> Any:

@@ -167,7 +167,7 @@ def _scratch(reach_x: int, blocks: int) -> int:
 
 
 def exact_power_bytes(directions: int, wavelengths: int, reach_x: int, terms: int, units: int) -> int:
-    """Bytes of `exact_power`: its result and the scratch of its work-items on a device of so many compute units."""
+    """Bytes of `exact_power`: its result and the scratch of its work-items on a device with `units` compute units."""
     return 8 * (
         directions * (wavelengths + _WAVELENGTHS) + _ITEMS_A_UNIT * units * _scratch(reach_x, -(-terms // LANES))
     )

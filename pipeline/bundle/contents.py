@@ -29,9 +29,7 @@ _SINE_ROUNDS = 1e-9
 def read(folder: Path) -> tuple[Manifest | None, list[str]]:
     """Reads the manifest of a bundle's folder. Returns it, None where it has faults, and the faults."""
     try:
-        document.read(folder)
-        text = (folder / MANIFEST).read_text(encoding="utf-8")
-        return Manifest.model_validate_json(text), []
+        return Manifest.model_validate_json(document.read_text(folder)), []
     except DamagedError as error:
         return None, [str(error)]
     except ValidationError as error:

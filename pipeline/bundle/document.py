@@ -19,6 +19,15 @@ def read(folder: Path) -> dict[str, Any]:
     Raises DamagedError, which names the manifest and no folder, where it is no plain file, or no JSON object of
     finite numbers and whole characters within 4 MiB and 64 levels.
     """
+    return _read(folder)[1]
+
+
+def read_text(folder: Path) -> str:
+    """Reads the text of the manifest of a bundle's folder. Raises DamagedError as `read` does."""
+    return _read(folder)[0]
+
+
+def _read(folder: Path) -> tuple[str, dict[str, Any]]:
     try:
         text = files.read_text(folder / MANIFEST, _MOST_BYTES)
         found = json.loads(text, parse_constant=_refuse, parse_float=_finite)
@@ -35,7 +44,7 @@ def read(folder: Path) -> dict[str, Any]:
         raise DamagedError(f"{MANIFEST} cannot be read: {error}") from None
     if not isinstance(found, dict):
         raise DamagedError(f"{MANIFEST} is not a JSON object")
-    return found
+    return text, found
 
 
 def _refuse(word: str) -> None:

@@ -72,7 +72,7 @@ class StackSize:
     reach: tuple[int, int]
 
     def stack_bytes(self, terms: int, itemsize: int) -> int:
-        """Computes the size of the stack of so many terms, bytes."""
+        """Computes the size of the stack of a number of terms, bytes."""
         rows, columns = self.kept.shape
         return 2 * rows * columns * terms * itemsize
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import floor, log10
-from typing import Any
+from typing import Any, NamedTuple
 
 from pipeline import layouts, resources
 from pipeline.config.models import Config
@@ -15,24 +15,35 @@ from pipeline.stages.stage import Summary
 from pipeline.surface import recipes
 from pipeline.surface.extent import Extent
 
-# keys that a refusal may propose to change, and the end of their range towards less work; those of a scan or of
-# another layout do not apply
-_WAYS_OUT: tuple[tuple[str, float], ...] = (
-    ("table.azimuths", 32),
-    ("table.rings", 8),
-    ("table.w_terms", 4),
-    ("table.resolution", 3),
-    ("table.step_nm", 50.0),
-    ("table.terms", 2),
-    ("surface.recipe.amplitude_um", 1e-3),
-    ("surface.recipe.height_um", 1e-3),
-    ("surface.recipe.depth_um", 1e-3),
-    ("surface.recipe.sigma_h_um", 1e-3),
-    ("surface.recipe.size_um", 1.0),
-    ("surface.recipe.pitch_um", 10.0),
-    ("render.size", 16),
-    ("coherence.sigma_um", 0.1),
-    ("accuracy.delta_e", 100.0),
+
+class _WayOut(NamedTuple):
+    """A key that a refusal may propose to change, and the end of its range towards less work.
+
+    rises: whether larger values are less work.
+    """
+
+    key: str
+    end: float
+    rises: bool = False
+
+
+# those of a scan or of another layout do not apply
+_WAYS_OUT = (
+    _WayOut("table.azimuths", 32),
+    _WayOut("table.rings", 8),
+    _WayOut("table.w_terms", 4),
+    _WayOut("table.resolution", 3),
+    _WayOut("table.step_nm", 50.0, rises=True),
+    _WayOut("table.terms", 2),
+    _WayOut("surface.recipe.amplitude_um", 1e-3),
+    _WayOut("surface.recipe.height_um", 1e-3),
+    _WayOut("surface.recipe.depth_um", 1e-3),
+    _WayOut("surface.recipe.sigma_h_um", 1e-3),
+    _WayOut("surface.recipe.size_um", 1.0),
+    _WayOut("surface.recipe.pitch_um", 10.0, rises=True),
+    _WayOut("render.size", 16),
+    _WayOut("coherence.sigma_um", 0.1),
+    _WayOut("accuracy.delta_e", 100.0, rises=True),
 )
 _MULTIPLES = {"table.azimuths": 32, "table.w_terms": 4}
 _HALVINGS, _PROPOSED = 12, 2
@@ -140,7 +151,7 @@ def require_an_end(config: Config, source: str) -> None:
 
 
 def _ends(found: Mapping[str, Need]) -> bool:
-    """Whether the work of all stages takes no longer than what is allowed."""
+    """Says whether the work of all stages takes no longer than what is allowed."""
     return sum(need.seconds for need in found.values()) <= resources.LONGEST_S
 
 
@@ -156,9 +167,9 @@ def _ways_out(
 ) -> Iterator[tuple[str, float]]:
     """Yields keys with the value closest to the config's with which its needs fit, by halving in proportion."""
     proposed = 0
-    for key, end in _WAYS_OUT:
+    for key, end, rises in _WAYS_OUT:
         value = _value(config, key)
-        if value is None or (value <= end) != (end in (50.0, 10.0, 100.0)) or value == end:
+        if value is None or (value >= end if rises else value <= end):
             continue
 
         def tried(number: float, key: str = key) -> bool:

@@ -73,7 +73,7 @@ class Foreseen:
 
 @dataclass(frozen=True)
 class LayoutSizes:
-    """What the stages of a layout need.
+    """Memory and time that the stages of a layout need.
 
     transform, table: of these stages. transform_bytes: of the transform, if the session holds it.
     table_bytes: of the table. freed_bytes: of arrays of both stages that the device's pool may keep.

@@ -74,6 +74,20 @@ def file_or_name(name: str) -> dict[str, str]:
     return {"name": name}
 
 
+def colour_parameters(config: Config) -> dict[str, Any]:
+    """Returns the sections of which colours and their errors depend, as part of an address."""
+    return {
+        "spectrum": light_parameters(config),
+        "material": material_parameters(config),
+        "accuracy": config.accuracy.model_dump(mode="json"),
+    }
+
+
+def scene_parameters(config: Config) -> dict[str, Any] | None:
+    """Returns the section [scene] as part of an address, None where there is none."""
+    return None if config.scene is None else config.scene.model_dump(mode="json")
+
+
 def light_parameters(config: Config) -> dict[str, Any]:
     """Returns the section [spectrum] as part of an address, with the digest of an illuminant's CSV."""
     section = config.light.model_dump(mode="json")

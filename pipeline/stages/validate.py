@@ -15,7 +15,7 @@ from pipeline.resources import Need, largest
 from pipeline.stages import render, surface
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.layout import Layout
-from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest
 from pipeline.tables.evaluate import table_evaluator
 
 REPORT = "report.html"
@@ -25,9 +25,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernel": kernel_digest("dft_stack.cl", "exact_power.cl"),
         "name": config.name,
-        "material": material_parameters(config),
-        "spectrum": light_parameters(config),
-        "accuracy": config.accuracy.model_dump(mode="json"),
+        **colour_parameters(config),
         "render": config.render.model_dump(mode="json"),
     }
 

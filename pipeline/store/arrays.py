@@ -51,7 +51,7 @@ def save(folder: Path, arrays: Mapping[str, Named], attributes: Mapping[str, Any
 def saving_bytes(nbytes: int) -> int:
     """Computes the memory in which `save` works, bytes, from the size of its largest array: shards in flight, twice.
 
-    zarr writes at most so many at once, each assembled from its chunks.
+    zarr writes at most _SHARDS_IN_FLIGHT shards at once, each assembled from its chunks.
     """
     return min(2 * nbytes, _SHARDS_IN_FLIGHT * _SHARD_BYTES)
 

@@ -114,22 +114,18 @@ def refusals(file: str, scan: Scan, measured: Measured) -> list[str]:
         lambda: _check_values(file, scan.heights),
         lambda: _check_holes(file, measured, largest_share),
     ]
-    if np.isfinite(measured.heights).any():
-        checks.append(lambda: _check_varies(file, measured.heights))
     if scan.pitch_um is not None:
         pitch_um = scan.pitch_um
         checks.append(lambda: _check_pitch(file, pitch_um))
-    if scan.um_per_unit is not None and np.isfinite(measured.heights).any():
-        unit: tuple[float, Origin] = scan.um_per_unit, "file"
-        checks.append(lambda: _check_range(file, measured.heights * unit[0], unit, is_image=False))
+    if np.isfinite(measured.heights).any():
+        checks.append(lambda: _check_heights(file, measured.heights, scan.um_per_unit))
     found = []
     for check in checks:
         try:
             check()
         except InputError as error:
             found.append(str(error))
-    # a constant height is outside of the allowed ranges, too
-    return list(dict.fromkeys(found))
+    return found
 
 
 # --- values ------------------------------------------------------------------------------------------
@@ -175,6 +171,14 @@ def _check_pitch(file: str, pitch_um: tuple[float, float]) -> None:
             f"{pitch_um[0]:.6g} x {pitch_um[1]:.6g} um",
             "mislabelled units? set surface.pitch_um (and override_file_units = true where the file states a pitch)",
         )
+
+
+def _check_heights(file: str, heights: NDArray[np.float64], um_per_unit: float | None) -> None:
+    """Raises InputError for heights that do not vary, and where their unit is known, for a range of no surface."""
+    if um_per_unit is None:
+        _check_varies(file, heights)
+    else:
+        _check_range(file, heights * um_per_unit, (um_per_unit, "file"), is_image=False)
 
 
 def _check_varies(file: str, heights: NDArray[np.float64]) -> None:

@@ -13,7 +13,7 @@ from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest
+from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, scene_parameters
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.surface import windows
@@ -36,7 +36,7 @@ def _parameters(config: Config) -> dict[str, Any]:
         "kernel": kernel_digest("polar_power_spectrum.cl", *PLANNING_KERNELS),
         "coherence": config.coherence.model_dump(mode="json"),
         "wavelengths": _wavelengths(config),
-        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+        "scene": scene_parameters(config),
         "table": layout_of(config).model_dump(mode="json"),
         "delta_e": config.budget_delta_e,
         "exposure_ru": config.accuracy.exposure_ru,

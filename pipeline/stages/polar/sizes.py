@@ -17,6 +17,7 @@ from pipeline.tables.planning import plan
 from pipeline.tables.planning.grid_search import Grids
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.bake import PolarBake
+from pipeline.tables.polar.spectral_integral import IntegralSize
 
 # tables that the search for a grid measures, and tables of the curves that `validate` shows
 _SEARCHED, _STUDIED = 6, 15
@@ -29,59 +30,24 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
 
     The search may go on to a larger grid; it then asks for its memory again.
     """
-    config, extent = foreseen.config, foreseen.extent
+    config, reference = foreseen.config, foreseen.reference
     layout = power_spectrum.layout_of(config)
     bake, rings, azimuths = _grid(foreseen)
     integral = bake.integral_size(rings, azimuths)
-    metal = config.material.fresnel == "conductor"
-    e_bytes, table = bake.power_spectrum_bytes(azimuths), integral.arrays(metal=metal)
-    chosen = dft_stack.size(extent, bake.sigma_um, float(bake.radius_per_um[-1]), bake.tolerance)
-    filled = spectrum.filled_terms(bake.terms)
-    stack = chosen.stack_bytes(filled, 4)
-    e_seconds = _gather_seconds(bake, azimuths, chosen.reach) * foreseen.windows
+    e_bytes, metal = bake.power_spectrum_bytes(azimuths), config.material.fresnel == "conductor"
+    chosen = dft_stack.size(foreseen.extent, bake.sigma_um, float(bake.radius_per_um[-1]), bake.tolerance)
     searched = _SEARCHED if "auto" in (layout.rings, layout.azimuths) else 0
     # the planner's spectral integral is that of a grey surface; a grid that the config sets is not tried
     tried = integral.arrays() if searched else {}
-    trial = Need(
-        {**base("power_spectrum"), **_transforming(foreseen, bake, azimuths, chosen, tried)},
-        resources.seconds(chebyshev_work(chosen, filled) * foreseen.windows)
-        + e_seconds * (1 + searched / 2)
-        + integral.seconds * searched,
-        max(stack, e_bytes, *([integral.table_bytes, integral.weights_bytes] if searched else [])),
-    )
-    reference = foreseen.reference
-    reading = {"reading of the power spectrum": loading_bytes(e_bytes)}
-    holding = {**base("table"), **foreseen.held(), "power spectrum": e_bytes, "table": integral.table_bytes}
-    between = chosen.chebyshev_bytes(filled, 4)["terms between two transforms"]
-    freed_bytes = stack + between + (e_bytes if searched else 0) + sum(tried.values()) + integral.weights_bytes
-    freed = spare(freed_bytes)
-    certified = {**reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material), **freed}
-    spectral_form = layout.form == "spectral"
-    needed = largest(
-        {**base("table"), **foreseen.held(), **reading, **freed},
-        {**holding, **table, **freed},
-        {**holding, **reference.making(), **freed},
-        {**holding, **certified},
-        {**holding, "reference": reference.nbytes, "writing": saving_bytes(integral.table_bytes), **freed},
-        {
-            **holding,
-            "reference": reference.nbytes,
-            "spectral form": spectral.building_bytes(e_bytes) if spectral_form else 0,
-            **freed,
-        },
-    )
-    table_need = Need(
-        needed,
-        integral.seconds + reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths),
-        max(integral.table_bytes, integral.weights_bytes, reference.stack.stack_bytes(reference.terms, 8)),
-    )
-    publish = config.publish
-    answering = reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material)
+    stack = chosen.chebyshev_bytes(spectrum.filled_terms(bake.terms), 4)
+    freed_bytes = stack["stack"] + stack["terms between two transforms"] + (e_bytes if searched else 0)
+    freed_bytes += sum(tried.values()) + integral.weights_bytes
     is_whole = polar_storage.is_whole(config)
-    choosing = {"textures": polar_storage.choosing_bytes(integral.table_bytes, bake.w_terms, publish), **answering}
+    choosing = {"textures": polar_storage.choosing_bytes(integral.table_bytes, bake.w_terms, config.publish)}
+    choosing |= reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material)
     return LayoutSizes(
-        transform=trial,
-        table=table_need,
+        transform=_transform(foreseen, bake, azimuths, chosen, integral, searched),
+        table=_table(foreseen, integral, e_bytes, freed_bytes),
         transform_bytes=e_bytes,
         table_bytes=integral.table_bytes,
         freed_bytes=freed_bytes + reference.stack.stack_bytes(reference.terms, 8),
@@ -91,6 +57,60 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         stored_bytes=0 if is_whole else 3 * integral.table_bytes // 2,
         # an image has four channels, here and in OpenEXR
         prepared=Need({"image": 2 * 4 * 4 * rings.count * azimuths}),
+    )
+
+
+def _transform(
+    foreseen: Foreseen,
+    bake: PolarBake,
+    azimuths: int,
+    chosen: dft_stack.StackSize,
+    integral: IntegralSize,
+    searched: int,
+) -> Need:
+    """Returns the need of the stage "power_spectrum"; searched: tables that the search for a grid measures."""
+    filled, e_bytes = spectrum.filled_terms(bake.terms), bake.power_spectrum_bytes(azimuths)
+    e_seconds = _gather_seconds(bake, azimuths, chosen.reach) * foreseen.windows
+    return Need(
+        {
+            **base("power_spectrum"),
+            **_transforming(foreseen, bake, azimuths, chosen, integral.arrays() if searched else {}),
+        },
+        resources.seconds(chebyshev_work(chosen, filled) * foreseen.windows)
+        + e_seconds * (1 + searched / 2)
+        + integral.seconds * searched,
+        max(
+            chosen.stack_bytes(filled, 4),
+            e_bytes,
+            *([integral.table_bytes, integral.weights_bytes] if searched else []),
+        ),
+    )
+
+
+def _table(foreseen: Foreseen, integral: IntegralSize, e_bytes: int, freed_bytes: int) -> Need:
+    """Returns the need of the stage "table"; freed_bytes: of arrays that the device's pool may keep."""
+    config, reference, freed = foreseen.config, foreseen.reference, spare(freed_bytes)
+    reading = {"reading of the power spectrum": loading_bytes(e_bytes)}
+    holding = {**base("table"), **foreseen.held(), "power spectrum": e_bytes, "table": integral.table_bytes}
+    certified = {"reference": reference.nbytes}
+    spectral_form = power_spectrum.layout_of(config).form == "spectral"
+    needed = largest(
+        {**base("table"), **foreseen.held(), **reading, **freed},
+        {**holding, **integral.arrays(metal=config.material.fresnel == "conductor"), **freed},
+        {**holding, **reference.making(), **freed},
+        {**holding, **reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material), **freed},
+        {**holding, **certified, "writing": saving_bytes(integral.table_bytes), **freed},
+        {
+            **holding,
+            **certified,
+            "spectral form": spectral.building_bytes(e_bytes) if spectral_form else 0,
+            **freed,
+        },
+    )
+    return Need(
+        needed,
+        integral.seconds + reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths),
+        max(integral.table_bytes, integral.weights_bytes, reference.stack.stack_bytes(reference.terms, 8)),
     )
 
 

@@ -12,7 +12,7 @@ from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.polar import power_spectrum
-from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import interpolator
@@ -24,10 +24,8 @@ _FILE = "table.zarr"
 def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernels": kernel_digest(*power_spectrum.PLANNING_KERNELS, "exact_power.cl"),
-        "spectrum": light_parameters(config),
-        # the certificate measures colours, so it depends on the whole material
-        "material": material_parameters(config),
-        "accuracy": config.accuracy.model_dump(mode="json"),
+        # of the certificate, which measures colours and so depends on the whole material
+        **colour_parameters(config),
     }
 
 

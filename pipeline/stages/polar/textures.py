@@ -10,7 +10,7 @@ from pipeline.config.models import Config
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.polar import table
-from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest, scene_parameters
 from pipeline.store import arrays
 from pipeline.tables.evaluate import Table
 from pipeline.tables.polar.compression import Envelope, Textures, whole
@@ -26,10 +26,8 @@ def _parameters(config: Config) -> dict[str, Any]:
         "kernels": kernel_digest("cubic_spline.cl", "dft_stack.cl", "exact_power.cl"),
         "precision": config.publish.precision,
         "textures": config.publish.textures,
-        "spectrum": light_parameters(config),
-        "material": material_parameters(config),
-        "accuracy": config.accuracy.model_dump(mode="json"),
-        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+        **colour_parameters(config),
+        "scene": scene_parameters(config),
     }
 
 

@@ -10,7 +10,7 @@ from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest, scene_parameters
 from pipeline.stages.taylor import stack
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
@@ -24,12 +24,10 @@ _FILE = "table.zarr"
 def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernel": kernel_digest("taylor_table.cl", "dft_stack.cl", "exact_power.cl"),
-        "spectrum": light_parameters(config),
-        # the certificate measures colours, so it depends on the whole material
-        "material": material_parameters(config),
+        # of the certificate, which measures colours and so depends on the whole material
+        **colour_parameters(config),
         "table": config.table.model_dump(mode="json"),
-        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
-        "accuracy": config.accuracy.model_dump(mode="json"),
+        "scene": scene_parameters(config),
     }
 
 

@@ -8,7 +8,7 @@ from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, light_parameters, material_parameters
+from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest, scene_parameters
 from pipeline.stages.taylor import table
 from pipeline.tables.evaluate import interpolator
 from pipeline.tables.taylor.table import TaylorTable
@@ -18,10 +18,8 @@ def _parameters(config: Config) -> dict[str, Any]:
     return {
         "kernels": kernel_digest("dft_stack.cl", "exact_power.cl"),
         "precision": config.publish.precision,
-        "spectrum": light_parameters(config),
-        "material": material_parameters(config),
-        "accuracy": config.accuracy.model_dump(mode="json"),
-        "scene": None if config.scene is None else config.scene.model_dump(mode="json"),
+        **colour_parameters(config),
+        "scene": scene_parameters(config),
     }
 
 
