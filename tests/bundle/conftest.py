@@ -1,16 +1,20 @@
 """Small bakes of both layouts, made once per session: the artifacts of a sinusoid."""
 
+import json
+import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from pipeline.bundle import checksums
 from pipeline.config.models import Config
 from pipeline.config.read import parse
 from pipeline.progress import silent
-from pipeline.stages import bundle, run
+from pipeline.stages import bundle as bundle_stage
+from pipeline.stages import run
 from pipeline.stages.stage import Inputs
 from pipeline.store.store import Artifact, Store
 
@@ -79,9 +83,45 @@ def publish(config: Config, artifacts: Mapping[str, Artifact], out: Path) -> Pat
     *_, stage = run.stages(config)
     with tempfile.TemporaryDirectory() as folder:
         summary = stage.produce(config, Inputs(artifacts), Path(folder), silent)
-        return bundle.place(Artifact(Path(folder), {"summary": summary}), out)
+        return bundle_stage.place(Artifact(Path(folder), {"summary": summary}), out)
 
 
 @pytest.fixture(scope="session")
 def bake(tmp_path_factory: pytest.TempPathFactory) -> Baker:
     return Baker(Store(tmp_path_factory.mktemp("store")))
+
+
+@pytest.fixture(scope="session")
+def whole(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return publish(small(), bake(small()), tmp_path_factory.mktemp("out"))
+
+
+@pytest.fixture
+def bundle(whole: Path, tmp_path: Path) -> Path:
+    """A copy that a test may damage."""
+    return Path(shutil.copytree(whole, tmp_path / whole.name))
+
+
+def forged(folder: Path, damage: Callable[[Path], None]) -> Path:
+    """Changes a bundle and renames it to its new digest, so that only the manifest contradicts."""
+    damage(folder)
+    (folder / checksums.SUMS).unlink()
+    return folder.rename(folder.parent / f"{folder.name.rpartition('+')[0]}+{checksums.write(folder)}")
+
+
+def with_values(**changes: Any) -> Callable[[Path], None]:
+    """Returns a function that sets values of the manifest: keys are paths with "__" between their parts."""
+
+    def damage(folder: Path) -> None:
+        path = folder / "manifest.json"
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        for name, value in changes.items():
+            *parents, last = (int(part) if part.isdigit() else part for part in name.split("__"))
+            place = manifest
+            for part in parents:
+                place = place[part]
+            assert isinstance(place, list) or last in place
+            place[last] = value
+        path.write_text(json.dumps(manifest), encoding="utf-8")
+
+    return damage

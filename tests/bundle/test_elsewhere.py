@@ -2,10 +2,8 @@
 
 import json
 import os
-import shutil
 import struct
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,37 +17,7 @@ from pipeline.errors import DamagedError
 from pipeline.report import images
 from tests.fuzz.bundles import zeros
 
-from .conftest import LAYOUTS, SCENE, Baker, publish, small
-from .test_verify import forged
-
-
-@pytest.fixture(scope="module")
-def whole(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return publish(small(), bake(small()), tmp_path_factory.mktemp("out"))
-
-
-@pytest.fixture
-def bundle(whole: Path, tmp_path: Path) -> Path:
-    """A copy that a test may damage."""
-    return Path(shutil.copytree(whole, tmp_path / whole.name))
-
-
-def with_values(**changes: Any) -> Callable[[Path], None]:
-    """Returns a function that sets values of the manifest: keys are paths with "__" between their parts."""
-
-    def damage(folder: Path) -> None:
-        path = folder / "manifest.json"
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        for name, value in changes.items():
-            *parents, last = (int(part) if part.isdigit() else part for part in name.split("__"))
-            place = manifest
-            for part in parents:
-                place = place[part]
-            place[last] = value
-        path.write_text(json.dumps(manifest), encoding="utf-8")
-
-    return damage
-
+from .conftest import LAYOUTS, SCENE, Baker, forged, publish, small, with_values
 
 IMPOSSIBLE: dict[str, list[dict[str, Any]]] = {
     "taylor": [

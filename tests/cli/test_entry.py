@@ -67,7 +67,9 @@ def test_a_signal_ends_everything(work: str, sent: signal.Signals, line: str) ->
 def test_a_killed_supervisor_takes_the_command_with_it() -> None:
     with start(IN_C) as process:
         process.kill()
+        # a command that lived on would hold the pipes open
         process.communicate(timeout=2.0)
+    assert process.returncode == -signal.SIGKILL
 
 
 @pytest.mark.parametrize("sent", [signal.SIGHUP, signal.SIGINT])

@@ -15,3 +15,9 @@ def _read_in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.Mo
 
     if request.path.name != "test_limits.py":
         monkeypatch.setattr(limited, "_by_child", read)
+
+
+@pytest.fixture
+def surface_topography() -> None:
+    """Skips a test where the library that reads most formats is absent."""
+    pytest.importorskip("SurfaceTopography.IO", exc_type=ImportError)

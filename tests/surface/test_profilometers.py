@@ -5,36 +5,16 @@ import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from pipeline.errors import InputError
 from pipeline.surface.readers import read_scan
 from pipeline.surface.scan import Scan
+from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, VOID, padded, with_void
 
-NY, NX = 10, 12
-# top row first; nothing looks the same when it is flipped or turned
-TOP_FIRST = np.arange(1.0, 121.0).reshape(NY, NX)
-VOID = (2, 3)
-PITCH_UM = (0.1, 0.2)
-
-
-@pytest.fixture(autouse=True)
-def _library() -> None:
-    pytest.importorskip("SurfaceTopography.IO", exc_type=ImportError)
-
-
-def with_void(value: float, dtype: str) -> NDArray[Any]:
-    stored = TOP_FIRST.astype(dtype)
-    stored[VOID] = value
-    return stored
-
-
-def padded(text: str, length: int) -> bytes:
-    return text.encode().ljust(length, b"\0")[:length]
+pytestmark = pytest.mark.usefixtures("surface_topography")
 
 
 def mdt(adc: int = 0) -> bytes:
