@@ -32,7 +32,7 @@ def run_command(
     changed are taken from the store. All configs are checked before the first one is baked.
     """
     if until is not None:
-        _bake_until(load_all(config_paths), until, store_root, as_json)
+        _bake_until(load_all(config_paths, store_root, until), until, store_root, as_json)
         return
     bake_all(config_paths, out, store_root, as_json, until="bundle")
 
@@ -45,7 +45,7 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
     from pipeline.errors import AccuracyError
     from pipeline.store import scratch
 
-    loaded = load_all(paths)
+    loaded = load_all(paths, store_root, until)
     for config in loaded:
         scratch.require_folder(out / config.name)
     baked = [_bake(config, out, store_root, until) for config in loaded]
@@ -93,17 +93,27 @@ def _certified(certificate: dict[str, Any]) -> str:
     )
 
 
-def load_all(paths: tuple[Path, ...]) -> "list[Config]":
-    """Loads configs. Raises ConfigError for faults, and for two configs of one name, which would share a folder."""
-    from pipeline.errors import ConfigError
+def load_all(paths: tuple[Path, ...], store_root: Path | None, until: str) -> "list[Config]":
+    """Loads configs, and checks those of which a stage is to do before any work starts.
 
-    loaded = [sources.load(path) for path in paths]
-    seen: dict[str, Path] = {}
-    for config, path in zip(loaded, paths, strict=True):
+    until: name of the last stage.
+    Raises ConfigError for faults, and for two configs of one name, which would share a folder.
+    """
+    from pipeline.config import read
+    from pipeline.errors import ConfigError
+    from pipeline.stages import run
+
+    store = console.open_store(store_root)
+    seen: dict[str, tuple[Config, Path]] = {}
+    for path in paths:
+        config = read.load(path)
         if config.name in seen:
-            raise ConfigError(str(path), [("name", f"{config.name!r} is also the name of {seen[config.name]}")])
-        seen[config.name] = path
-    return loaded
+            raise ConfigError(str(path), [("name", f"{config.name!r} is also the name of {seen[config.name][1]}")])
+        seen[config.name] = config, path
+    for config, path in seen.values():
+        if not all(step.cached for step in run.plan(config, store, until)):
+            sources.check(config, path)
+    return [config for config, _ in seen.values()]
 
 
 def _bake(config: "Config", out: Path, store_root: Path | None, until: str) -> tuple[dict[str, Any], str | None]:
@@ -152,7 +162,7 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
     from pipeline.stages import run
 
     store = console.open_store(store_root)
-    planned = [(config, run.plan(config, store)) for config in load_all(config_paths)]
+    planned = [(config, run.plan(config, store)) for config in load_all(config_paths, store_root, "bundle")]
     plans = {config.name: _explained(config, steps, store) for config, steps in planned}
     if as_json:
         console.print_json(plans)

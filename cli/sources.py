@@ -11,11 +11,17 @@ from cli import console
 def load(path: Path) -> Any:
     """Loads a config and checks all that can be checked before a bake. Raises ConfigError with all faults."""
     from pipeline.config import read as config_file
-    from pipeline.stages import config_check as preflight
 
     config = config_file.load(path)
-    preflight.check(config, str(path))
+    check(config, path)
     return config
+
+
+def check(config: Any, path: Path) -> None:
+    """Checks what the models of a config cannot check alone. Raises ConfigError with all faults."""
+    from pipeline.stages import config_check
+
+    config_check.check(config, str(path))
 
 
 def evaluator(source: Path, exact: bool, store_root: Path | None, progress: Any) -> Any:

@@ -11,12 +11,12 @@ from pipeline.bundle import checksums, entries, material, readme
 from pipeline.bundle.document import MANIFEST
 from pipeline.bundle.manifest import SCHEMA_VERSION, Manifest, MapImage, TableImage
 from pipeline.bundle.prepared import Prepared
-from pipeline.bundle.verify import summary, verify
 from pipeline.config.models import Config
 from pipeline.errors import DamagedError
 from pipeline.progress import Progress, silent
 from pipeline.report import images
 from pipeline.store import scratch
+from pipeline.store.files import differences
 from pipeline.store.store import Artifact, writing
 
 EVALUATOR, README = "evaluate.py", "README.md"
@@ -56,7 +56,7 @@ def place(content: Path, out: Path, name: str) -> Path:
     """Copies a bundle to `out/name`, where it appears by one rename.
 
     content: folder with the files. out: made where it is missing. name: of the bundle.
-    Returns the folder; an existing bundle of this name is verified and kept.
+    Returns the folder; an existing bundle of this name is compared with it and kept.
     Raises DamagedError where its files have changed; StorageError where a file cannot be written.
     """
     target = out / name
@@ -64,20 +64,22 @@ def place(content: Path, out: Path, name: str) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         scratch.remove_abandoned(out, _TEMPORARY)
         if target.exists():
-            _require_intact(target)
+            _require_same(target, content)
             return target
         folder = scratch.make(out, _TEMPORARY)
         try:
             _copy(content, folder)
-            _move(folder, target)
+            _move(folder, target, content)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
     return target
 
 
-def _require_intact(bundle: Path) -> None:
-    faults = verify(bundle)
+def _require_same(bundle: Path, content: Path) -> None:
+    faults = differences(bundle, content)
     if faults:
+        from pipeline.bundle.verify import summary
+
         raise DamagedError(
             f"{bundle}: expected the bundle of this content, which was published before, but its files have changed: "
             f"{summary(faults)}. Move it away and publish again"
@@ -94,14 +96,14 @@ def _copy(content: Path, folder: Path) -> None:
             shutil.copyfile(source, target)
 
 
-def _move(folder: Path, target: Path) -> None:
-    """Renames a finished bundle to its place; if another process was faster, its bundle is verified and kept."""
+def _move(folder: Path, target: Path, content: Path) -> None:
+    """Renames a finished bundle to its place; if another process was faster, its bundle is compared and kept."""
     try:
         folder.rename(target)
     except OSError as error:
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-        _require_intact(target)
+        _require_same(target, content)
 
 
 def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], folder: Path, progress: Progress) -> None:

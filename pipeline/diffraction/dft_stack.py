@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.fft import next_fast_len
 
 from kernels import device, dft_stack
 from kernels.dft_stack import Kept
@@ -212,6 +211,8 @@ def crop_to_window(field: HeightField, sigma_um: float) -> HeightField:
 
 def _kept_samples(extent: Extent, sigma_um: float) -> tuple[int, int]:
     """Computes the samples (ny, nx) within 8.5 sigma of the middle."""
+    from scipy.fft import next_fast_len
+
     (ny, nx), (pitch_x, pitch_y) = extent.shape, extent.pitch_um
     # lengths that are products of small primes are fast to transform
     keep_y, keep_x = (

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import exp, pi
 
 import numpy as np
-from scipy.special import jv
 
 from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
@@ -175,6 +174,8 @@ def chebyshev_order(z: float, tolerance: float) -> int:
 
     z: phase, radians. tolerance: error allowed in exp(i z t).
     """
+    from scipy.special import jv
+
     orders = np.arange(int(z) + 400)
     tail: Array = 2.0 * np.cumsum(np.abs(jv(orders, z))[::-1])[::-1]
     return max(1, int(np.argmax(tail <= tolerance)) - 1)

@@ -10,7 +10,6 @@ from math import ceil, pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import jv
 
 from kernels import polar_power_spectrum
 from kernels.chebyshev import chebyshev
@@ -161,6 +160,8 @@ def gather(
     Returns E (2 a / 16, n_r, nodes, 16), first the given azimuths, then their opposites. Raises DeviceError if no
     device works.
     """
+    from scipy.special import jv
+
     n = np.arange(built.terms)[:, None]
     # w < 0 makes the argument of the Jacobi-Anger expansion negative, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um

@@ -9,12 +9,10 @@ run.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from types import ModuleType
 
 import numpy as np
-import pyfftw
 from numpy.typing import NDArray
-from pyfftw.interfaces import scipy_fft
-from scipy import fft as scipy
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -25,32 +23,39 @@ _KEEP_PLANS_S = 2.0
 
 def fft(values: Real) -> Complex:
     """Transforms values (n,) to (n,)."""
-    with _fftw():
-        return np.asarray(scipy.fft(values))
+    with _fftw() as transforms:
+        return np.asarray(transforms.fft(values))
 
 
 def rfft2(values: Real, shape: tuple[int, int] | None = None) -> Complex:
     """Transforms real values (ny, nx), padded with zeros to `shape`, to half of a spectrum (ny, nx // 2 + 1)."""
-    with _fftw():
-        return np.asarray(scipy.rfft2(values, s=shape))
+    with _fftw() as transforms:
+        return np.asarray(transforms.rfft2(values, s=shape))
 
 
 def irfft2(spectrum: Complex, shape: tuple[int, int]) -> Real:
     """Transforms half of a spectrum, (ny, nx // 2 + 1), to real values of `shape` (ny, nx)."""
-    with _fftw():
-        return np.asarray(scipy.irfft2(spectrum, s=shape))
+    with _fftw() as transforms:
+        return np.asarray(transforms.irfft2(spectrum, s=shape))
 
 
 @contextmanager
-def _fftw() -> Iterator[None]:
-    _prepare()
-    with scipy.set_backend(scipy_fft, only=True):
-        yield
+def _fftw() -> Iterator[ModuleType]:
+    """Gives `scipy.fft`, which transforms by FFTW inside the context."""
+    from scipy import fft
+
+    with fft.set_backend(_interface(), only=True):
+        yield fft
 
 
 @cache
-def _prepare() -> None:
-    """Configures pyFFTW's interfaces for this process."""
+def _interface() -> ModuleType:
+    """Configures pyFFTW's interfaces for this process, and returns that of `scipy.fft`."""
+    import pyfftw
+    from pyfftw.interfaces import scipy_fft
+
     pyfftw.config.PLANNER_EFFORT = "FFTW_ESTIMATE"
     pyfftw.interfaces.cache.enable()
     pyfftw.interfaces.cache.set_keepalive_time(_KEEP_PLANS_S)
+    interface: ModuleType = scipy_fft
+    return interface

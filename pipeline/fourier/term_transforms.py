@@ -12,7 +12,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-import pyfftw
 from numpy.typing import NDArray
 
 from kernels.dft_stack import Kept
@@ -56,6 +55,8 @@ class _Workspace:
     """The plans that transform one term at a time, and their arrays."""
 
     def __init__(self, shape: tuple[int, int], places: KeptCoefficients, real: np.dtype[Any]) -> None:
+        import pyfftw
+
         ny, nx = shape
         complex_ = np.result_type(real, np.complex64)
         self._places = places

@@ -14,7 +14,6 @@ from functools import cache
 from pathlib import Path
 
 import platformdirs
-import pyfftw
 
 from pipeline.store import digest
 
@@ -29,6 +28,8 @@ _learned: list[Wisdom] = []
 @contextmanager
 def planning() -> Iterator[None]:
     """Puts stored wisdom into force for the plans that are made within, and stores what they add to it."""
+    import pyfftw
+
     with _lock:
         kept = _read()
         pyfftw.forget_wisdom()
@@ -48,6 +49,8 @@ def planning() -> Iterator[None]:
 
 def file() -> Path:
     """Returns the file for this processor and these versions."""
+    import pyfftw
+
     folder = Path(platformdirs.user_cache_dir("diffract-bake"))
     return folder / f"pyFFTW-{pyfftw.__version__}-{pyfftw.fftw_version}" / f"{digest.of_json(_processor())}.json"
 

@@ -16,7 +16,6 @@ wavelength. Orders m > 0 lean back from the mirror direction towards the normal 
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import jv
 
 from pipeline.arrays import Array
 from pipeline.optics import geometry
@@ -83,6 +82,8 @@ def efficiency(power: Values, wi: Array, wr: Array) -> Array:
 
 def sinusoid(order: Values, s_per_um: Values, amplitude_um: Values) -> Array:
     """Computes |c_m|^2 = J_m(s a)^2 of h = a cos(2 pi x / L), by the Jacobi-Anger expansion."""
+    from scipy.special import jv
+
     return np.asarray(jv(order, np.asarray(s_per_um) * amplitude_um) ** 2)
 
 

@@ -1,6 +1,7 @@
 """Files that anyone may have written: folders are listed without opening a file, and only plain files are read."""
 
 import errno
+import filecmp
 import os
 import stat
 from collections.abc import Iterable
@@ -37,6 +38,22 @@ def listing(folder: Path, expected: Iterable[str]) -> tuple[dict[str, int], list
                 if len(found) + len(faults) > _MOST_ENTRIES:
                     return found, [*sorted(faults), f"more than {_MOST_ENTRIES} files; the others were not looked at"]
     return dict(sorted(found.items())), sorted(faults)
+
+
+def differences(folder: Path, original: Path) -> list[str]:
+    """Compares the files of a folder with those of an original, byte by byte.
+
+    folder: the folder. original: a folder with the expected files.
+    Returns one line for each file that is missing, added or changed, that cannot be read, or that is no plain file.
+    Raises OSError where the folder cannot be listed.
+    """
+    names = sorted(path.relative_to(original).as_posix() for path in original.rglob("*") if path.is_file())
+    sizes, faults = listing(folder, names)
+    faults += [f"{name} is missing" for name in names if name not in sizes]
+    faults += [f"{name} was added" for name in sizes if name not in names]
+    common = [name for name in names if name in sizes]
+    _, changed, unread = filecmp.cmpfiles(original, folder, common, shallow=False)
+    return faults + [f"{name} was changed" for name in changed] + [f"{name} cannot be read" for name in unread]
 
 
 def read_text(path: Path, most_bytes: int) -> str:

@@ -7,7 +7,6 @@ from math import atan2, degrees, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, ndimage
 
 from pipeline.arrays import Array
 from pipeline.fourier import backend as fourier
@@ -142,7 +141,7 @@ def _spectrum(field: HeightField, highest_per_um: float, window_of: Callable[[in
 
 def _ascending(samples: int, pitch_um: float, highest_per_um: float) -> tuple[np.ndarray, Array]:
     """Returns the indices of a transform and their frequencies, 1/um, ascending from -highest to highest."""
-    place, frequency = fft.fftshift(np.arange(samples)), fft.fftshift(fft.fftfreq(samples, pitch_um))
+    place, frequency = np.fft.fftshift(np.arange(samples)), np.fft.fftshift(np.fft.fftfreq(samples, pitch_um))
     kept = np.abs(frequency) <= highest_per_um
     return place[kept], frequency[kept]
 
@@ -167,6 +166,8 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
 
     Each octave of |f| is smoothed by a kernel of its own width. Octaves overlap, so that no maximum lies between two.
     """
+    from scipy import fft, ndimage
+
     fx, fy = spectrum.fx, spectrum.fy[:, None]
     radius = np.hypot(fx, fy)
     repeats = np.hypot(fx / spectrum.bin_per_um[0], fy / spectrum.bin_per_um[1])
@@ -203,8 +204,8 @@ def _smooth(
     transform: rfft2 of the power, padded with zeros to the shape `padded` (my, mx).
     """
     my, mx = padded
-    gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * fft.rfftfreq(mx)) ** 2)
-    gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * fft.fftfreq(my)) ** 2)
+    gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * np.fft.rfftfreq(mx)) ** 2)
+    gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * np.fft.fftfreq(my)) ** 2)
     rows, columns = spectrum.power.shape
     return fourier.irfft2(transform * gain_y[:, None] * gain_x, padded)[:rows, :columns]
 

@@ -5,6 +5,19 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("cli", "pipeline", "kernels")
+# libraries that take a tenth of a second or more to import
+HEAVY = {
+    "colour",
+    "jinja2",
+    "matplotlib",
+    "OpenEXR",
+    "PIL",
+    "pyfftw",
+    "pyopencl",
+    "scipy",
+    "SurfaceTopography",
+    "zarr",
+}
 
 
 def sources(*places):

@@ -6,9 +6,8 @@ import sys
 
 import pytest
 
-from .source import PACKAGES, ROOT, anywhere, imported, relative, sources, tree, within
+from .source import HEAVY, PACKAGES, ROOT, anywhere, imported, relative, sources, tree, within
 
-HEAVY = {"matplotlib", "zarr", "colour", "pyopencl", "OpenEXR", "PIL", "SurfaceTopography", "jinja2"}
 STAGE_FREE = ("tables", "fourier", "diffraction", "accuracy", "optics", "surface")
 
 

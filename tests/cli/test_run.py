@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image
 
 from pipeline.report import images
+from tests.architecture.source import HEAVY
 from tests.cli.tool import Result, Tool, files, temporary_files, too_wide
 
 STAGES = ["surface", "stack", "table", "textures", "render", "validate", "bundle"]
@@ -85,6 +86,14 @@ def test_a_second_run_finds_all_cached_and_changes_nothing(baked: Tool) -> None:
     assert baked.artifacts() == before[1]
     assert temporary_files(baked) == []
     assert min(seconds) < 2.0
+
+
+def test_a_cached_run_imports_no_heavy_library(baked: Tool) -> None:
+    environment = {"PYTHONPROFILEIMPORTTIME": "1", "DIFFRACT_BAKE_DEBUG": "1"}
+    result = baked.process("run", "small.toml", environment=environment)
+    names = {line.rpartition("|")[2].strip().partition(".")[0] for line in result.stderr.splitlines()}
+    assert "numpy" in names
+    assert sorted(names & HEAVY) == []
 
 
 def test_json_is_one_document_and_alone_on_stdout(baked: Tool) -> None:

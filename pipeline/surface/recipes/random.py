@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from pipeline.fourier import backend as fourier
 from pipeline.surface.heightfield import HeightField
@@ -51,7 +50,7 @@ def lowpass(
     spectrum: rfft2 of a field, (ny, nx // 2 + 1). y, x: the axes. length_um: (lx, ly), um.
     Returns (ny, nx).
     """
-    fx = fft.rfftfreq(x.samples, x.pitch_um)
-    fy = fft.fftfreq(y.samples, y.pitch_um)
+    fx = np.fft.rfftfreq(x.samples, x.pitch_um)
+    fy = np.fft.fftfreq(y.samples, y.pitch_um)
     gain = np.exp(-((np.pi * length_um[1] * fy[:, None]) ** 2)) * np.exp(-((np.pi * length_um[0] * fx) ** 2))
     return fourier.irfft2(spectrum * gain, (y.samples, x.samples))

@@ -1,7 +1,6 @@
 """The azimuths into which a surface scatters light, to first order in its height."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from pipeline.arrays import Array
 from pipeline.diffraction.dft_stack import Stack
@@ -48,6 +47,8 @@ def probing_angles(built: Stack, count: int, rng: np.random.Generator) -> tuple[
     built: a Chebyshev stack. count: number of azimuths. rng: source of random numbers.
     Returns the azimuths (count,), radians, and their weights (count,) in a mean over all azimuths, of mean 1.
     """
+    from scipy.ndimage import gaussian_filter1d
+
     phi, seen = _scattering(built)
     lit, edges = np.histogram(phi % np.pi, bins=_ANGLE_BINS, range=(0.0, np.pi), weights=seen)
     # the window widens a line; a typical radius sets the angle
