@@ -65,20 +65,21 @@ def spectral_evaluator(source: Path, exact: bool, store_root: Path | None, progr
     if source.is_dir():
         raise click.UsageError("--wavelengths needs a config: a bundle's tables are integrated over wavelengths")
     config = load(source)
-    if not exact and getattr(config.table, "form", None) != "spectral":
+    if not exact and not config.table.holds_wavelengths:
         raise click.UsageError('--wavelengths needs table.form = "spectral" in the config, or --exact')
+    from pipeline import layouts
     from pipeline.accuracy.exact import reference_of
     from pipeline.optics.geometry import uvw
     from pipeline.stages import surface
-    from pipeline.stages.polar import power_spectrum
-    from pipeline.tables.polar import spectral
 
-    (artifact,) = _artifacts(config, ("surface" if exact else "power_spectrum",), store_root, progress)
+    layout = layouts.of(config.table)
+    (artifact,) = _artifacts(config, ("surface" if exact else layout.transform.name,), store_root, progress)
     if exact:
         reference = reference_of(surface.load(artifact), config, progress)
         return lambda wi, wr, lambda_nm: reference.power(uvw(wi, wr), lambda_nm)
-    table = spectral.build(power_spectrum.load(artifact))
-    return lambda wi, wr, lambda_nm: spectral.look_up(table, uvw(wi, wr), lambda_nm)
+    assert layout.at_wavelengths is not None
+    power = layout.at_wavelengths(artifact)
+    return lambda wi, wr, lambda_nm: power(uvw(wi, wr), lambda_nm)
 
 
 def _artifacts(config: Any, stages: tuple[str, ...], store_root: Path | None, progress: Any) -> list[Any]:

@@ -2,28 +2,22 @@
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from pipeline.bundle import document
 from pipeline.bundle.document import MANIFEST
-from pipeline.bundle.manifest import Image, Manifest, MapImage, PolarGridEntry, TableImage, TaylorGridEntry
+from pipeline.bundle.layout import Image, Pixels, TexelCheck
+from pipeline.bundle.manifest import Manifest, MapImage
 from pipeline.errors import DamagedError
 from pipeline.optics.scene import Scene
 from pipeline.report import exr, images
 from pipeline.report.exr import Structure
-from pipeline.tables.planning.plan import rho_max
-from pipeline.tables.taylor import grid
-from pipeline.tables.taylor.table import reachable_nodes
 
 # zlib shrinks zeros a thousandfold; tables and maps shrink to half, and further where a scene leaves texels out
 _MOST_GROWTH, _GROWS_BELOW = 100, 2**27
 _MOST_SCHEMA_FAULTS = 20
-# another machine may round the sine of a scene's angle differently
-_SINE_ROUNDS = 1e-9
 
 
 def read(folder: Path) -> tuple[Manifest | None, list[str]]:
@@ -71,10 +65,6 @@ def _contradictions(manifest: Manifest) -> list[str]:
     names = [entry.file for entry in (*manifest.tables, *manifest.maps)]
     if len(set(names)) < len(names):
         found.append(f"{MANIFEST}: an image is named twice")
-    if isinstance(manifest.grid, PolarGridEntry) and not _basis_fits(manifest.grid, len(manifest.tables)):
-        found.append(
-            f"{MANIFEST}: grid: {len(manifest.tables)} tables do not hold the outputs that basis and w_terms need"
-        )
     for table in manifest.tables:
         if table.layout != manifest.grid.layout:
             found.append(f"{MANIFEST}: {table.file} is not of the grid's layout")
@@ -82,15 +72,7 @@ def _contradictions(manifest: Manifest) -> list[str]:
             found.append(f"{MANIFEST}: {table.file} is not of the grid's size")
         if table.pixel_type != manifest.precision or set(table.channels) != set(images.RGBA):
             found.append(f"{MANIFEST}: {table.file} is not RGBA of precision {manifest.precision}")
-    return found + _scene_faults(manifest)
-
-
-def _basis_fits(grid: PolarGridEntry, images: int) -> bool:
-    """Tells whether the basis is (outputs, 3, w_terms) for the outputs that the images hold."""
-    if grid.basis is None:
-        return 4 * images == 3 * grid.w_terms
-    shapes = {(len(output), *(len(channel) for channel in output)) for output in grid.basis}
-    return len(grid.basis) == 4 * images and shapes == {(3, *3 * (grid.w_terms,))}
+    return found + _grid_faults(manifest)
 
 
 def _scene(manifest: Manifest) -> Scene | None:
@@ -99,17 +81,13 @@ def _scene(manifest: Manifest) -> Scene | None:
     return found
 
 
-def _scene_faults(manifest: Manifest) -> list[str]:
-    """Lists contradictions between the scene and the directions that the table holds."""
+def _grid_faults(manifest: Manifest) -> list[str]:
+    """Lists contradictions between the grid, the number of tables and the scene."""
     try:
         scene = _scene(manifest)
     except ValidationError:
         return [f"{MANIFEST}: provenance.config.scene is not the [scene] of a config"]
-    if isinstance(manifest.grid, PolarGridEntry):
-        expected = rho_max(scene)
-        if abs(manifest.grid.rho_max - expected) > _SINE_ROUNDS:
-            return [f"{MANIFEST}: grid.rho_max is {manifest.grid.rho_max:g}, but the scene reaches {expected:g}"]
-    return []
+    return [f"{MANIFEST}: {fault}" for fault in manifest.grid.contradictions(len(manifest.tables), scene)]
 
 
 def _missing(manifest: Manifest, folder: Path) -> list[str]:
@@ -158,8 +136,8 @@ def _png_faults(path: Path, entry: MapImage) -> list[str]:
 
 def _pixel_faults(folder: Path, manifest: Manifest, structures: Collection[str]) -> list[str]:
     """Decodes all images, one by one, and lists tables whose texels are impossible."""
-    tables = {table.file: table for table in manifest.tables}
-    reached = _reached(manifest.grid, _scene(manifest)) if isinstance(manifest.grid, TaylorGridEntry) else None
+    tables = {table.file for table in manifest.tables}
+    check = manifest.grid.texel_check(_scene(manifest))
     found = []
     for name in structures:
         try:
@@ -168,32 +146,12 @@ def _pixel_faults(folder: Path, manifest: Manifest, structures: Collection[str])
             found.append(f"{name} {error}")
             continue
         if name in tables:
-            found += _texel_faults(tables[name], channels, reached)
+            found += [f"{name}: {fault}" for fault in _texel_faults(channels, check)]
     return found
 
 
-def _reached(entry: TaylorGridEntry, scene: Scene | None) -> NDArray[np.bool_]:
-    """Computes the nodes of a Taylor table that its scene needs, bool (v, u)."""
-    if scene is not None:
-        views = scene.views.model_copy(update={"theta_max_deg": scene.views.theta_max_deg * (1.0 - _SINE_ROUNDS)})
-        scene = scene.model_copy(update={"views": views})
-    return reachable_nodes(grid.nodes(entry.width, entry.power), scene)
-
-
-def _texel_faults(
-    entry: TableImage, channels: dict[str, NDArray[Any]], reached: NDArray[np.bool_] | None
-) -> list[str]:
-    """Lists impossible texels of a table.
-
-    channels: (rows, columns) by name. reached: nodes that a Taylor table must have, bool (rows, columns).
-    """
+def _texel_faults(channels: dict[str, Pixels], check: TexelCheck) -> list[str]:
+    """Lists impossible texels of a table; channels: (rows, columns) by name. check: that of its layout."""
     if not all(np.isfinite(plane).all() for plane in channels.values()):
-        return [f"{entry.file}: a texel is not a finite number"]
-    if reached is None:
-        return []
-    computed = channels["A"] == 1.0
-    if not np.all(computed | (channels["A"] == 0.0)):
-        return [f"{entry.file}: A is neither 0 nor 1"]
-    if np.any(reached & ~computed):
-        return [f"{entry.file}: A says that a texel was not computed, but the scene reaches it"]
-    return []
+        return ["a texel is not a finite number"]
+    return check(channels)

@@ -16,6 +16,8 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from pipeline.layouts import textures
+
 Array = NDArray[np.float64]
 COLUMNS, AT_ONCE = "theta_i,phi_i,theta_r,phi_r", 16384  # directions at once, to bound memory
 
@@ -30,8 +32,7 @@ class BundleTables:
         planes = [read_rgba(folder / "tables" / Path(entry["file"]).name, size) for entry in images]
         if not all(np.isfinite(plane).all() for plane in planes):
             raise ValueError("expected texels that are finite numbers")
-        layout = {"taylor": TaylorTextures, "polar": PolarTextures}[self.manifest["grid"]["layout"]]
-        self.table = layout(self.manifest["grid"], planes, [entry["scale"] for entry in images])
+        self.table = textures(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3)."""
@@ -65,86 +66,6 @@ class BundleTables:
         below = np.sqrt(1.0 - (1.0 - cos**2) / eta**2)
         r_s, r_p = (cos - eta * below) / (cos + eta * below), (eta * cos - below) / (eta * cos + below)
         return np.asarray(0.5 * (np.abs(r_s) ** 2 + np.abs(r_p) ** 2) @ np.array(samples["luminous_weight"]))
-
-
-class PolarTextures:
-    """Cubic B-splines on rings and azimuths, Chebyshev polynomials in |w|; texels (ring, azimuth, output)."""
-
-    def __init__(self, grid: dict[str, Any], planes: list[NDArray[Any]], scale: list[list[float]]) -> None:
-        self.grid, outputs = grid, 4 * len(planes)
-        self.texels = np.concatenate([p * np.array(s) for p, s in zip(planes, scale, strict=True)], axis=-1)
-        basis = np.eye(outputs) if grid["basis"] is None else np.array(grid["basis"])
-        self.basis = basis.reshape(outputs, 3, grid["w_terms"])
-
-    def value(self, u: Array, v: Array, w: Array) -> Array:
-        """Computes g(rho) sum_k T_k(2 |w| / w_max - 1) sum_o output_o(u, v) basis[o, channel, k], (directions, 3)."""
-        rho = np.hypot(u, v)
-        x = np.clip(2.0 * np.abs(w) / np.sqrt(np.maximum(4.0 - rho**2, 1e-6)) - 1.0, -1.0, 1.0)
-        chebyshev = np.cos(np.arange(self.basis.shape[2]) * np.arccos(x)[:, None])
-        g = (1.0 + (rho / self.grid["envelope_radius"]) ** 2) ** -self.grid["envelope_exponent"]
-        g[rho > self.grid["rho_max"] * (1.0 + 1e-6)] = np.nan  # outside the scene
-        ring = np.minimum(np.arcsinh(rho / self.grid["r0"]) / self.grid["step"], self.grid["height"] - 1)
-        outputs = self.interpolate(ring, self.azimuth(u, v))
-        return np.asarray(g[:, None] * np.einsum("no,ock,nk->nc", outputs, self.basis, chebyshev, optimize=True))
-
-    def azimuth(self, u: Array, v: Array) -> Array:
-        """Computes the fractional column of (u, v), turned by -axis and stretched."""
-        cos, sin = np.cos(self.grid["axis_rad"]), np.sin(self.grid["axis_rad"])
-        angle = np.arctan2(cos * v - sin * u, self.grid["stretch"] * (cos * u + sin * v))
-        return np.asarray(angle / (2.0 * np.pi) % 1.0 * self.grid["width"])
-
-    def interpolate(self, ring: Array, azimuth: Array) -> Array:
-        """Interpolates outputs (directions, outputs) from the 4 x 4 texels around each place."""
-        rows, columns = np.floor(ring).astype(int) - 1, np.floor(azimuth).astype(int) - 1
-        total = np.zeros((len(ring), len(self.basis)))
-        for a, across in enumerate(spline(ring % 1.0)):
-            for b, along in enumerate(spline(azimuth % 1.0)):
-                total += (across * along)[:, None] * self.texels[self.place(rows + a, columns + b)]
-        return total
-
-    def place(self, row: NDArray[Any], column: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Maps rows and columns beyond the grid to texels: through the origin, mirrored at the rim, periodic."""
-        last, width = self.grid["height"] - 1, self.grid["width"]
-        return last - np.abs(last - np.abs(row)), (column + np.where(row < 0, width // 2, 0)) % width
-
-
-def spline(t: Array) -> Array:
-    """Computes the weights (4, places) of a cubic B-spline's four texels."""
-    s = 1.0 - t
-    return np.stack([s**3, 4.0 - 3.0 * t**2 * (2.0 - t), 4.0 - 3.0 * s**2 * (2.0 - s), t**3]) / 6.0
-
-
-class TaylorTextures:
-    """I_p on a grid of (u, v), bilinear between texels; i_p is (v, u, channel, p), computed is (v, u)."""
-
-    def __init__(self, grid: dict[str, Any], planes: list[NDArray[Any]], scale: list[float]) -> None:
-        self.i_p = np.stack([plane[..., :3] for plane in planes], axis=-1)
-        self.scale, self.computed = scale, planes[0][..., 3] == 1.0
-        self.n, self.power = int(grid["width"]), float(grid["power"])
-        if not self.power > 0.0:
-            raise ValueError(f"expected a power above 0, got {self.power}")
-
-    def value(self, u: Array, v: Array, w: Array) -> Array:
-        """Computes sum_p w^p I_p(u, v), (directions, 3)."""
-        column, row = self.texel(u), self.texel(v)
-        left, low = (np.clip(np.floor(index).astype(int), 0, self.n - 2) for index in (column, row))
-        a, b, total = column - left, row - low, np.zeros((len(w), 3))
-        for up, right, weight in ((0, 0, (1 - a) * (1 - b)), (0, 1, a * (1 - b)), (1, 0, (1 - a) * b), (1, 1, a * b)):
-            at = low + up, left + right
-            known = self.computed[at] | (weight == 0.0)
-            total += np.where(known, weight, np.nan)[:, None] * self.polynomial(self.i_p[at], w)
-        return total
-
-    def texel(self, u: Array) -> Array:
-        """Computes the texel index i of u = 2 |t|^a sign(t), t = 2 i / (n - 1) - 1; texture: (i + 1/2) / n."""
-        return np.asarray(0.5 * (np.sign(u) * (np.abs(u) / 2.0) ** (1.0 / self.power) + 1.0) * (self.n - 1))
-
-    def polynomial(self, i_p: NDArray[Any], w: Array) -> Array:
-        """Computes sum_p w^p I_p by Horner's rule, from the highest p down."""
-        total = np.zeros((len(w), 3))
-        for p in range(len(self.scale) - 1, -1, -1):
-            total = total * w[:, None] + self.scale[p] * i_p[..., p].astype(float)
-        return total
 
 
 def read_rgba(path: Path, size: tuple[int, int]) -> NDArray[Any]:

@@ -7,10 +7,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
+from pipeline import layouts
 from pipeline.bundle import checksums, entries, material, readme
 from pipeline.bundle.document import MANIFEST
-from pipeline.bundle.manifest import SCHEMA_VERSION, Manifest, MapImage, TableImage
-from pipeline.bundle.prepared import Prepared
+from pipeline.bundle.layout import Prepared, TableImage
+from pipeline.bundle.manifest import SCHEMA_VERSION, Manifest, MapImage
 from pipeline.config.models import Config
 from pipeline.errors import DamagedError
 from pipeline.progress import Progress, silent
@@ -23,8 +24,10 @@ EVALUATOR, README = "evaluate.py", "README.md"
 TABLES, MAPS = "tables", "maps"
 REPORT: Literal["report.html"] = "report.html"
 _TEMPORARY = ".publishing-"
-# the line of the evaluator that a bundle's own replaces
+# the lines of the evaluator that a bundle's own replaces: the unit, and the look-ups of all layouts
 _UNIT = "X,Y,Z are in the unit that manifest.json states."
+_ANY_LOOK_UP = "\nfrom pipeline.layouts import textures\n"
+_SCRIPT = '\n\nif __name__ == "__main__":\n'
 # as pipeline.report.images.write_xyz names them
 MAP_CHANNELS = ("brdf.X", "brdf.Y", "brdf.Z")
 
@@ -140,10 +143,22 @@ def _write(config: Config, table: Prepared, inputs: Mapping[str, Artifact], fold
         provenance=entries.provenance(config, {name: artifact.key for name, artifact in inputs.items()}),
     )
     _write_text(folder / MANIFEST, page.text())
-    _write_text(folder / README, readme.text(page, table.constants))
-    source = files("pipeline.bundle").joinpath("evaluator.py").read_text(encoding="utf-8")
+    _write_text(folder / README, readme.text(page, table))
     unit = entries.XYZ_UNIT[config.material.normalisation]
-    _write_text(folder / EVALUATOR, source.replace(_UNIT, f"X,Y,Z are in {unit}."))
+    _write_text(folder / EVALUATOR, evaluator(page.grid.layout).replace(_UNIT, f"X,Y,Z are in {unit}."))
+
+
+def evaluator(layout: str) -> str:
+    """Composes evaluate.py, which runs without this project: the common text and the look-up of one layout.
+
+    The names that a look_up.py uses are those that evaluator.py imports and defines.
+    """
+    look_up = files(layouts.LAYOUTS[layout].bundle).joinpath("look_up.py").read_text(encoding="utf-8")
+    # two blank lines end the imports
+    own = look_up.partition("\n\n\n")[2]
+    common = files("pipeline.bundle").joinpath("evaluator.py").read_text(encoding="utf-8")
+    before, _, after = common.replace(_ANY_LOOK_UP, "").partition(_SCRIPT)
+    return f"{before}\n\n{own}{_SCRIPT}{after}"
 
 
 def _write_tables(table: Prepared, folder: Path, progress: Progress) -> list[TableImage]:

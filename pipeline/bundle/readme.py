@@ -1,33 +1,38 @@
 """README.md of a bundle: a page for writers of shaders, with the numbers of the bundle.
 
-templates/ has the text, one page for each layout; kernels/shaders/ has the look-up in GLSL.
+templates/ has the text, and the folder of each layout its part of it; kernels/shaders/ has the look-up in GLSL.
 """
 
 import re
 from collections.abc import Mapping
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 
+from pipeline import layouts
+from pipeline.bundle.layout import Constant, Prepared
 from pipeline.bundle.manifest import Manifest
 from pipeline.bundle.material import MaterialEntry
 from pipeline.report import template
 
-Constant = bool | int | float
+# the factor C, which follows the look-up of any layout
+BRDF = files("kernels").joinpath("shaders", "brdf.glsl")
 _CONSTANT = re.compile(r"^(const \w+ (\w+) = )[^;]*;", re.MULTILINE)
 
 
-def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
+def text(manifest: Manifest, table: Prepared) -> str:
     """Writes README.md of a bundle.
 
-    manifest: of the bundle. constants: values of the constants of the layout's shader, by name.
+    manifest: of the bundle. table: the layout's part.
     Returns Markdown.
     """
     layout, certificate = manifest.grid.layout, manifest.certificate
+    look_up = shader(layouts.bundled(layout).shader, table.constants)
     return template.markdown(
-        "pipeline.bundle",
-        f"{layout}.md.in",
+        (layouts.LAYOUTS[layout].bundle, "pipeline.bundle"),
+        "layout.md.in",
         manifest=manifest,
         grid=manifest.grid,
-        rho_max=getattr(manifest.grid, "rho_max", 2.0),
+        rho_max=table.rho_max,
         tables=len(manifest.tables),
         material=manifest.material,
         reflectance=manifest.material.reflectance_table,
@@ -35,7 +40,7 @@ def text(manifest: Manifest, constants: Mapping[str, Constant]) -> str:
         certified=next(error for error in certificate.random.colour if error.exposure_ru == certificate.exposure_ru),
         loss=manifest.storage_loss,
         domain=manifest.domain,
-        shader="\n".join((shader(layout, constants), shader("brdf", _brdf(manifest.material)))).rstrip(),
+        shader="\n".join((look_up, shader(BRDF, _brdf(manifest.material)))).rstrip(),
     )
 
 
@@ -44,17 +49,17 @@ def _brdf(material: MaterialEntry) -> dict[str, Constant]:
     return {"DIVISOR": material.divisor, "EXPONENT": material.exponent, "SHADOWING": material.shadowing}
 
 
-def shader(name: str, constants: Mapping[str, Constant]) -> str:
-    """Reads a file of kernels/shaders/ with the constants of a table in place of the file's.
+def shader(file: Traversable, constants: Mapping[str, Constant]) -> str:
+    """Reads a file in GLSL with the constants of a table in place of the file's.
 
-    name: of the file without its suffix. constants: a value for every global constant of the file, by name.
+    constants: a value for every global constant of the file, by name.
     Returns GLSL.
     Raises ValueError where the names are not those of the file.
     """
-    source = files("kernels").joinpath("shaders", f"{name}.glsl").read_text(encoding="utf-8")
+    source = file.read_text(encoding="utf-8")
     declared = {name for _, name in _CONSTANT.findall(source)}
     if declared != constants.keys():
-        raise ValueError(f"{name}.glsl declares {sorted(declared)}, but got values for {sorted(constants)}")
+        raise ValueError(f"{file.name} declares {sorted(declared)}, but got values for {sorted(constants)}")
     return _CONSTANT.sub(lambda found: f"{found[1]}{_literal(constants[found[2]])};", source)
 
 

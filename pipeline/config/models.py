@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
+from pipeline import layouts
 from pipeline.layouts import TableSettings
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import Coherence
@@ -16,7 +17,6 @@ from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.optics.scene import Direction, Lights, Scene
 from pipeline.surface.source import SurfaceSource
-from pipeline.tables.polar.layout import PolarLayout
 from pipeline.validated import Exposure, Validated
 
 # the mean CIELAB error for which polar tables are planned where the config sets no budget
@@ -69,7 +69,7 @@ class Config(Validated):
     coherence: Coherence = Coherence()
     light: Light = Field(default=Light(), alias="spectrum")
     material: Material = Material()
-    table: TableSettings = PolarLayout()
+    table: TableSettings = layouts.default()
     accuracy: Accuracy = Accuracy()
     scene: Scene | None = None
     render: Render = Render()

@@ -90,10 +90,11 @@ def _repeated_lights(config: Config) -> list[tuple[str, str]]:
 
 
 def _texture_faults(config: Config) -> list[tuple[str, str]]:
-    """Finds a number of textures for the paper's table, which always has one image per power of w."""
+    """Finds a number of textures for a table that a bundle cannot hold in fewer."""
     if not config.table.compresses and config.publish.textures not in ("auto", "full"):
+        those = " and ".join(name for name, layout in layouts.LAYOUTS.items() if layout.settings.compresses)
         return [
-            ("publish.textures", f"{config.publish.textures} applies to polar tables only; leave it out for others")
+            ("publish.textures", f"{config.publish.textures} applies to {those} tables only; leave it out for others")
         ]
     return []
 
@@ -121,7 +122,7 @@ def _fault(error: Any) -> tuple[str, str]:
         return key, f"expected a section (a table of keys), got {_shortened(error['input'])}"
     if error["type"].startswith("union_tag"):
         called = str(error["ctx"]["discriminator"]).strip("'")
-        kinds = _KINDS if called == "kind" else layouts.NAMES
+        kinds = _KINDS if called == "kind" else layouts.LAYOUTS
         return key, f"expected a {called}, one of {', '.join(kinds)}, got {_shortened(error['input'])}"
     message = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "value_error":
@@ -135,6 +136,6 @@ def _shortened(value: Any) -> str:
 
 
 def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:
-    types = {"float", "str", "int", "LaserLine", *_KINDS, *layouts.NAMES}
+    types = {"float", "str", "int", "LaserLine", *_KINDS, *layouts.LAYOUTS}
     shapes = ("tuple[", "literal[", "constrained-", "function-")
     return loc.index(part) > 0 and (part in types or part.startswith(shapes))

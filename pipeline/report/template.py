@@ -4,12 +4,12 @@ import base64
 from typing import Any
 
 
-def markdown(package: str, name: str, **values: Any) -> str:
-    """Fill a template of a package with values, as they are.
+def markdown(packages: tuple[str, ...], name: str, **values: Any) -> str:
+    """Fill a template of the first package that has it with values, as they are; it may extend one of the others.
 
     Raises jinja2.UndefinedError for a value that the template asks for and does not get.
     """
-    return _fill(package, name, values, autoescape=False)
+    return _fill(packages, name, values, autoescape=False)
 
 
 def html(package: str, name: str, **values: Any) -> str:
@@ -17,14 +17,14 @@ def html(package: str, name: str, **values: Any) -> str:
 
     Raises jinja2.UndefinedError for a value that the template asks for and does not get.
     """
-    return _fill(package, name, values, autoescape=True)
+    return _fill((package, "pipeline.report"), name, values, autoescape=True)
 
 
-def _fill(package: str, name: str, values: dict[str, Any], *, autoescape: bool) -> str:
+def _fill(packages: tuple[str, ...], name: str, values: dict[str, Any], *, autoescape: bool) -> str:
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader(package), PackageLoader("pipeline.report")]),
+        loader=ChoiceLoader([PackageLoader(package) for package in packages]),
         undefined=StrictUndefined,
         autoescape=autoescape,
         trim_blocks=True,

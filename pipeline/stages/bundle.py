@@ -23,16 +23,23 @@ _CONTENT = "content"
 def _parameters(config: Config) -> dict[str, Any]:
     from pipeline.bundle import entries
 
-    return {"config": entries.resolved(config), "sources": _sources_digest()}
+    return {"config": entries.resolved(config), "sources": _sources_digest(config.table.layout)}
 
 
 @cache
-def _sources_digest() -> str:
-    """Computes the SHA-256 of all text that is shipped in bundles: evaluator, shaders and templates."""
-    bundle, shaders = files("pipeline.bundle"), files("kernels").joinpath("shaders")
-    sources = [bundle.joinpath("evaluator.py")]
-    for folder in (bundle.joinpath("templates"), shaders):
-        sources += sorted((file for file in folder.iterdir() if file.is_file()), key=lambda file: file.name)
+def _sources_digest(layout: str) -> str:
+    """Computes the SHA-256 of all text that is shipped in bundles of a layout: evaluator, shaders and templates."""
+    from pipeline.bundle import readme
+
+    common, own = files("pipeline.bundle"), files(layouts.LAYOUTS[layout].bundle)
+    sources = [
+        common.joinpath("evaluator.py"),
+        own.joinpath("look_up.py"),
+        common.joinpath("templates", "README.md.in"),
+        own.joinpath("templates", "layout.md.in"),
+        readme.BRDF,
+        layouts.bundled(layout).shader,
+    ]
     return sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
 
 
@@ -73,4 +80,4 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
 def stage_of(layout: Layout) -> Stage:
     """Returns the bundle stage of a layout; its inputs are all stages before, because the manifest describes each."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render", "validate")
-    return Stage("bundle", 5, inputs, _parameters, _produce)
+    return Stage("bundle", 6, inputs, _parameters, _produce, work=lambda _config: "tables, maps and report")

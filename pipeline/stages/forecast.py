@@ -1,51 +1,31 @@
 """Memory and time of every stage before it begins, and the refusal of those that exceed their limits."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from math import floor, log10
-from typing import Any, NamedTuple
+from typing import Any
 
 from pipeline import layouts, resources
 from pipeline.config.models import Config
 from pipeline.errors import BakeError, ConfigError, ResourceError
 from pipeline.resources import Need, largest
 from pipeline.stages import bundle, render, surface, validate
-from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, WayOut, base, heap, spare
 from pipeline.stages.session import kept_bytes
 from pipeline.stages.stage import Summary
 from pipeline.surface import recipes
 from pipeline.surface.extent import Extent
 
-
-class _WayOut(NamedTuple):
-    """A key that a refusal may propose to change, and the end of its range towards less work.
-
-    rises: whether larger values are less work.
-    """
-
-    key: str
-    end: float
-    rises: bool = False
-
-
-# those of a scan or of another layout do not apply
+# those that do not apply, to a scan for example, are left out
 _WAYS_OUT = (
-    _WayOut("table.azimuths", 32),
-    _WayOut("table.rings", 8),
-    _WayOut("table.w_terms", 4),
-    _WayOut("table.resolution", 3),
-    _WayOut("table.step_nm", 50.0, rises=True),
-    _WayOut("table.terms", 2),
-    _WayOut("surface.recipe.amplitude_um", 1e-3),
-    _WayOut("surface.recipe.height_um", 1e-3),
-    _WayOut("surface.recipe.depth_um", 1e-3),
-    _WayOut("surface.recipe.sigma_h_um", 1e-3),
-    _WayOut("surface.recipe.size_um", 1.0),
-    _WayOut("surface.recipe.pitch_um", 10.0, rises=True),
-    _WayOut("render.size", 16),
-    _WayOut("coherence.sigma_um", 0.1),
-    _WayOut("accuracy.delta_e", 100.0, rises=True),
+    WayOut("surface.recipe.amplitude_um", 1e-3),
+    WayOut("surface.recipe.height_um", 1e-3),
+    WayOut("surface.recipe.depth_um", 1e-3),
+    WayOut("surface.recipe.sigma_h_um", 1e-3),
+    WayOut("surface.recipe.size_um", 1.0),
+    WayOut("surface.recipe.pitch_um", 10.0, rises=True),
+    WayOut("render.size", 16, multiple=1),
+    WayOut("coherence.sigma_um", 0.1),
+    WayOut("accuracy.delta_e", 100.0, rises=True),
 )
-_MULTIPLES = {"table.azimuths": 32, "table.w_terms": 4}
 _HALVINGS, _PROPOSED = 12, 2
 
 
@@ -167,9 +147,9 @@ def _ways_out(
 ) -> Iterator[tuple[str, float]]:
     """Yields keys with the value closest to the config's with which its needs fit, by halving in proportion."""
     proposed = 0
-    for key, end, rises in _WAYS_OUT:
-        value = _value(config, key)
-        if value is None or (value >= end if rises else value <= end):
+    for way in (*layouts.of(config.table).ways_out, *_WAYS_OUT):
+        key, value = way.key, _value(config, way.key)
+        if value is None or (value >= way.end if way.rises else value <= way.end):
             continue
 
         def tried(number: float, key: str = key) -> bool:
@@ -180,11 +160,11 @@ def _ways_out(
             except BakeError:
                 return False
 
-        good, bad = _rounded(key, end, value), value
+        good, bad = way.rounded(way.end, value), value
         if not tried(good):
             continue
         for _ in range(_HALVINGS):
-            middle = _rounded(key, (good * bad) ** 0.5, good)
+            middle = way.rounded((good * bad) ** 0.5, good)
             if middle in (good, bad):
                 break
             good, bad = (middle, bad) if tried(middle) else (good, middle)
@@ -218,15 +198,3 @@ def _with(config: Config, key: str, number: float) -> Config:
         changed = parent.model_copy(update={name: changed})
     renewed: Config = changed
     return renewed
-
-
-def _rounded(key: str, number: float, towards: float) -> float:
-    """Rounds to two digits, or to what the key may be, towards another number."""
-    if key == "table.resolution":
-        return float(2 * (int(number) // 2) + 1)
-    if key in ("table.rings", "table.terms", "render.size"):
-        return float(int(number))
-    if key in _MULTIPLES:
-        return float(max(1, int(number) // _MULTIPLES[key]) * _MULTIPLES[key])
-    digit = 10.0 ** (floor(log10(number)) - 1)
-    return float(f"{round(number / digit) * digit:.3g}") if number != towards else number

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import floor, log10
 
 from kernels.memory import MOST_SPARE_BYTES
 from pipeline.config.models import Config
@@ -19,8 +20,6 @@ from pipeline.surface.extent import Extent
 # a grating of 100 x 100 samples, in a process that compiles the kernels; another needs 145 MiB less
 _BASE_BYTES = {
     "surface": 300 * MIB,
-    "power_spectrum": 325 * MIB,
-    "stack": 300 * MIB,
     "table": 330 * MIB,
     "textures": 335 * MIB,
     "render": 335 * MIB,
@@ -92,9 +91,36 @@ class LayoutSizes:
     prepared: Need
 
 
+@dataclass(frozen=True)
+class WayOut:
+    """A key that a refusal may propose to change, and the end of its range towards less work.
+
+    rises: whether larger values are less work. multiple: of which the key's whole number has to be, None for a real
+    number. odd: whether it is one above such a multiple.
+    """
+
+    key: str
+    end: float
+    rises: bool = False
+    multiple: int | None = None
+    odd: bool = False
+
+    def rounded(self, number: float, towards: float) -> float:
+        """Rounds to two digits, or to what the key may be, towards another number."""
+        if self.multiple is not None:
+            return float(max(1, int(number) // self.multiple) * self.multiple + self.odd)
+        digit = 10.0 ** (floor(log10(number)) - 1)
+        return float(f"{round(number / digit) * digit:.3g}") if number != towards else number
+
+
+def process(nbytes: int) -> Arrays:
+    """Returns the memory of the process itself, as an array of this size."""
+    return {"interpreter, driver, kernels": nbytes}
+
+
 def base(stage: str) -> Arrays:
-    """Returns the memory of the process itself in a stage."""
-    return {"interpreter, driver, kernels": _BASE_BYTES[stage]}
+    """Returns the memory of the process itself in a stage that is common to all layouts."""
+    return process(_BASE_BYTES[stage])
 
 
 def spare(*freed: int) -> Arrays:

@@ -2,17 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipeline.accuracy.convergence import CoarseMap, Study
+from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.stages.foreseen import Foreseen, LayoutSizes
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, WayOut
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import Evaluator, Table
 
 if TYPE_CHECKING:
-    from pipeline.bundle.prepared import Prepared
+    from pipeline.bundle.layout import Prepared
 
 
 @dataclass(frozen=True)
@@ -23,12 +24,19 @@ class Layout:
     textures: the stage that stores the table as a bundle holds it, in few textures or half floats.
     load: reads the table of an artifact. table_of: returns the table of a stage's inputs, from memory if it is there.
     stored_of: returns the table that the bundle's textures hold.
-    size: describes the size of the table, for a plan.
     study: returns the curves of error against each setting that `validate` shows, from config, inputs, the table's
         evaluator and the map on which errors are measured. study_remark: a sentence on them for the report.
     sizes: computes memory and time of the layout's stages before they begin.
+    ways_out: keys of [table] that a refusal of too much work may propose to change.
     settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
+    stored: returns such rows on the textures, from the config and the loss in their summary.
     prepare: makes the table's part of a bundle.
+    at_wavelengths: makes the function (uvw, lambda_nm) -> |P|^2, (n, 3), (L,) -> (n, L), from the transform's
+        artifact, for a [table] that holds wavelengths.
+
+    The table's summary holds "wavelengths", "unknown_share" and "skipped_share", as the manifest states them, and its
+    "certificate"; that of the textures holds "loss", which is None or the JSON of the layout's entry in the manifest,
+    and the "certificate" of what they hold.
     """
 
     transform: Stage
@@ -37,9 +45,11 @@ class Layout:
     load: Callable[[Artifact], Table]
     table_of: Callable[[Inputs], Table]
     stored_of: Callable[[Inputs], Table]
-    size: Callable[[Config], str]
     study: Callable[[Config, Inputs, Evaluator, CoarseMap], Study]
     study_remark: str
     sizes: Callable[[Foreseen], LayoutSizes]
+    ways_out: tuple[WayOut, ...]
     settings: Callable[[Summary, Summary], list[list[str]]]
+    stored: Callable[[Config, dict[str, Any]], list[list[str]]]
     prepare: "Callable[[Config, Inputs], Prepared]"
+    at_wavelengths: Callable[[Artifact], Callable[[Array, Array], Array]] | None = None

@@ -80,4 +80,8 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     return Need({**base("render"), **spare(sizes.freed_bytes), **held, **arrays}, seconds)
 
 
-RENDER = Stage("render", 4, ("table", "textures"), _parameters, _produce, uses_device=True)
+def _work(config: Config) -> str:
+    return f"{len(config.render.lights)} map(s) of {config.render.size}²"
+
+
+RENDER = Stage("render", 4, ("table", "textures"), _parameters, _produce, uses_device=True, work=_work)

@@ -238,15 +238,7 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
 
 def _cost(stage: Stage, config: Config, last: Artifact | None, need: Need | None) -> str:
     """Describes the work of a stage, and the time that it took last, in s, or an estimate of it."""
-    texts = {
-        "power_spectrum": f"a grid for a mean dE of {config.budget_delta_e:g}",
-        "table": layouts.of(config.table).size(config),
-        "textures": f"in {config.publish.precision}, {config.publish.textures}",
-        "render": f"{len(config.render.lights)} map(s) of {config.render.size}²",
-        "validate": f"{len(config.render.lights)} map(s) of 301² at 1 nm",
-        "bundle": "tables, maps and report",
-    }
-    parts = [texts[stage.name]] if stage.name in texts else []
+    parts = [text for text in [stage.work(config)] if text]
     seconds = None if last is None else last.record.get("provenance", {}).get("seconds")
     if seconds is not None:
         parts.append(f"{seconds:.1f} s last time")

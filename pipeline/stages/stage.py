@@ -41,6 +41,7 @@ class Stage:
     parameters: returns all values that the stage reads from the config, as JSON; they are part of the address.
     produce: writes the files of the artifact into a folder and returns its summary, as JSON.
     uses_device: whether it launches kernels.
+    work: describes the work of the stage for a config, for a plan.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Stage:
     parameters: Callable[[Config], dict[str, Any]]
     produce: Callable[[Config, Inputs, Path, Progress], Summary]
     uses_device: bool = False
+    work: Callable[[Config], str] = lambda _config: ""
 
     def key(self, config: Config, input_keys: Mapping[str, str]) -> str:
         """Computes the address of the artifact, 64 hex digits, from the config and the addresses of all inputs."""
@@ -60,6 +62,11 @@ class Stage:
                 "inputs": {name: input_keys[name] for name in self.inputs},
             }
         )
+
+
+def textures_work(config: Config) -> str:
+    """Describes the stage "textures" of a config, for a plan."""
+    return f"in {config.publish.precision}, {config.publish.textures}"
 
 
 def kernel_digest(*names: str) -> str:

@@ -122,7 +122,11 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     return Need({**base("validate"), **kept, **foreseen.held(), **arrays}, seconds, sizes.study.buffer)
 
 
+def _work(config: Config) -> str:
+    return f"{len(config.render.lights)} map(s) of {checks.MAP_SIZE}² at 1 nm"
+
+
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render")
-    return Stage("validate", 7, inputs, _parameters, _produce, uses_device=True)
+    return Stage("validate", 7, inputs, _parameters, _produce, uses_device=True, work=_work)

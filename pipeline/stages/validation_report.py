@@ -6,6 +6,7 @@ from typing import Any
 from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.report import template
+from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs
 
 Rows = list[list[str]]
@@ -100,7 +101,7 @@ def build(config: Config, inputs: Inputs, results: dict[str, Any], pictures: Map
         subtitle="Diffraction BRDF: what was baked and how far it is from the exact sum.",
         warnings=surface["warnings"],
         exposure_ru=config.render.exposure_ru,
-        colours=[*_colour_rows(config), *_stored_rows(config, textures["loss"])],
+        colours=[*_colour_rows(config), *_stored_rows(config, layout, textures["loss"])],
         clamped=table["certificate"]["random"]["clamped"],
         maps=[((inputs["render"].folder / light["png"]).read_bytes(), light) for light in render["maps"]],
         surface=_surface_rows(surface),
@@ -132,18 +133,11 @@ def _colour_rows(config: Config) -> Rows:
     ]
 
 
-def _stored_rows(config: Config, loss: dict[str, Any] | None) -> Rows:
+def _stored_rows(config: Config, layout: Layout, loss: dict[str, Any] | None) -> Rows:
     """The precision and number of the textures, and what they change of the table as baked."""
     if loss is None:
         return [["stored in", f"{config.publish.precision}, without loss"]]
-    if loss["layout"] == "taylor":
-        return [["stored in", f"half floats, which change colours by at most ΔE {loss['largest_delta_e']:.2g}"]]
-    mirror, verdict = loss["added_in_mirror"]["mean"], "kept" if loss["mirror_kept"] else "visibly changed"
-    return [
-        ["stored in", f"{config.publish.precision}, {loss['textures']} of {loss['most_textures']} textures"],
-        ["mean ΔE that this adds", f"{loss['added']['mean']:.3g} at {loss['added']['exposure_ru']:g} RU"],
-        ["mean ΔE in mirror directions at 1 RU", f"{mirror:.3g}: the highlight is {verdict}"],
-    ]
+    return layout.stored(config, loss)
 
 
 def _relative_error_rows(results: dict[str, Any]) -> Rows:

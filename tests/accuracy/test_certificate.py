@@ -2,8 +2,8 @@
 
 import pytest
 
-from pipeline.accuracy import certificate
 from pipeline.errors import AccuracyError
+from pipeline.stages.polar import certificate
 from pipeline.tables.evaluate import table_evaluator
 from tests.tables.planned import config, exact_of, planned
 

@@ -96,7 +96,7 @@ def entries():
     block = re.search(r"^```text\n(cli/ .*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
     assert block is not None
     parents, found = [], {}
-    for indent, name, text in re.findall(r"^( {0,4})(\w+)/ +(.*(?:\n {9,}.*)*)", block[1], re.MULTILINE):
+    for indent, name, text in re.findall(r"^( {0,6})(\w+)/ +(.*(?:\n {9,}.*)*)", block[1], re.MULTILINE):
         parents[len(indent) // 2 :] = [name]
         found[ROOT.joinpath(*parents)] = text
     return found

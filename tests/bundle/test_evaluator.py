@@ -11,8 +11,9 @@ import pytest
 
 from pipeline import layouts
 from pipeline.arrays import Array
-from pipeline.bundle import evaluator, material
-from pipeline.bundle.polar import grid_entry
+from pipeline.bundle import material
+from pipeline.bundle.polar import look_up
+from pipeline.bundle.polar.prepare import grid_entry
 from pipeline.bundle.verify import open_bundle
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
@@ -77,7 +78,7 @@ def test_a_table_without_symmetry_is_looked_up_equally() -> None:
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), w])
     textures = whole(table)
     planes = [np.moveaxis(textures.values[:, 4 * q : 4 * q + 4], 1, -1) for q in range(textures.count)]
-    page = evaluator.PolarTextures(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
+    page = look_up.PolarTextures(grid_entry(textures).model_dump(), planes, [[1.0] * 4] * textures.count)
     np.testing.assert_allclose(page.value(*uvw), table.look_up(uvw.T), atol=2e-4)
 
 

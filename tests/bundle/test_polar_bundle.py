@@ -11,8 +11,9 @@ from pydantic import TypeAdapter
 from pipeline.accuracy import checks
 from pipeline.accuracy.certificate import Certificate
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
-from pipeline.bundle import polar_storage
-from pipeline.bundle.manifest import Manifest, PolarGridEntry, PolarLoss
+from pipeline.bundle.manifest import Manifest
+from pipeline.bundle.polar import storage
+from pipeline.bundle.polar.layout import PolarGridEntry, PolarLoss
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, ConfigError
@@ -131,7 +132,7 @@ def test_a_bundle_has_the_error_that_it_states(
     assert len(manifest.tables) == textures == loss_of(manifest).textures
     with OpenEXR.File(str(folder / manifest.tables[-1].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(kind)}
-    wi, wr = random_pairs(None, RANDOM_DIRECTIONS, polar_storage._SEED)
+    wi, wr = random_pairs(None, RANDOM_DIRECTIONS, storage._SEED)
     table = table_evaluator(polar_table.load(bake(small("polar"))["table"]), small("polar").radiometry)
     evaluate = open_bundle(folder).xyz
     mirror, unit = wi * [-1.0, -1.0, 1.0], small("polar").radiometry.unit
@@ -178,16 +179,16 @@ def test_auto_takes_the_fewest_textures_within_the_budget(bake: Baker, tmp_path:
 @pytest.mark.slow
 def test_auto_takes_all_textures_if_no_number_keeps_the_budget(bake: Baker, monkeypatch: pytest.MonkeyPatch) -> None:
     tried = []
-    measure = polar_storage._Measure.__call__
+    measure = storage._Measure.__call__
 
-    def hopeless(self: polar_storage._Measure, stored: polar_storage.Stored) -> PolarLoss:
+    def hopeless(self: storage._Measure, stored: storage.Stored) -> PolarLoss:
         tried.append(stored.textures.count)
         found = measure(self, stored)
         return found.model_copy(
             update={"error": ColourError(exposure_ru=7500.0, mean=200.0, percentile_99=0.0, maximum=0.0)}
         )
 
-    monkeypatch.setattr(polar_storage._Measure, "__call__", hopeless)
+    monkeypatch.setattr(storage._Measure, "__call__", hopeless)
     with pytest.raises(AccuracyError, match=r'9 textures .* Set publish\.precision = "float"$'):
         # another budget than elsewhere, whose textures are in the store
         bake(small("polar", accuracy={"delta_e": BUDGET - 0.5}, publish={"precision": "half"}))

@@ -15,7 +15,8 @@ from PIL import Image
 
 from pipeline.accuracy import scalar_domain
 from pipeline.bundle import checksums
-from pipeline.bundle.manifest import Manifest, TaylorGridEntry
+from pipeline.bundle.manifest import Manifest
+from pipeline.bundle.taylor.layout import TaylorGridEntry
 from pipeline.bundle.verify import verify
 from pipeline.errors import DamagedError, StorageError
 from pipeline.optics import colour

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline import layouts
 from pipeline.bundle import evaluator, readme
+from pipeline.bundle.polar import look_up
 from pipeline.bundle.verify import open_bundle
 from pipeline.optics import geometry
 
@@ -76,7 +78,7 @@ def test_the_look_up_in_a_readme_compiles(
 
 
 def test_a_tables_constants_replace_those_of_the_file() -> None:
-    text = readme.shader("taylor", {"POWERS": 7, "N": 41.0, "A": 1e-5})
+    text = readme.shader(layouts.bundled("taylor").shader, {"POWERS": 7, "N": 41.0, "A": 1e-5})
     for line in ("const int POWERS = 7;", "const float N = 41.0;", "const float A = 1e-05;"):
         assert line in text
     after = source("taylor").partition("uniform")[2]
@@ -86,7 +88,7 @@ def test_a_tables_constants_replace_those_of_the_file() -> None:
 @pytest.mark.parametrize("constants", [{"POWERS": 7, "N": 41.0}, {"POWERS": 7, "N": 41.0, "A": 1.0, "B": 2.0}])
 def test_other_constants_than_the_files_are_refused(constants: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"taylor\.glsl declares \['A', 'N', 'POWERS'\]"):
-        readme.shader("taylor", constants)
+        readme.shader(layouts.bundled("taylor").shader, constants)
 
 
 def in_float32(bundle: evaluator.BundleTables, wi: np.ndarray, wr: np.ndarray) -> np.ndarray:
@@ -103,8 +105,8 @@ def in_float32(bundle: evaluator.BundleTables, wi: np.ndarray, wr: np.ndarray) -
     turn = np.where(rho > 0, np.arctan2(turned[1], f(grid["stretch"]) * turned[0]) / f(6.28318531), f(0))
     azimuth = (turn - np.floor(turn)) * f(azimuths)
     found = np.zeros((len(wi), outputs), f)
-    for a, across in enumerate(evaluator.spline(ring - np.floor(ring))):
-        for b, along in enumerate(evaluator.spline(azimuth - np.floor(azimuth))):
+    for a, across in enumerate(look_up.spline(ring - np.floor(ring))):
+        for b, along in enumerate(look_up.spline(azimuth - np.floor(azimuth))):
             at = bundle.table.place(ring.astype(int) - 1 + a, azimuth.astype(int) - 1 + b)
             found += (across * along)[:, None].astype(f) * texels[at]
     w_max = np.sqrt(np.maximum(f(4) - rho * rho, f(1e-6)))

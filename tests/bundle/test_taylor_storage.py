@@ -7,8 +7,8 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from pipeline.bundle import taylor_storage
-from pipeline.bundle.manifest import TaylorLoss
+from pipeline.bundle.taylor import storage
+from pipeline.bundle.taylor.layout import TaylorLoss
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import delta_e
@@ -29,7 +29,7 @@ def table(bake: Baker) -> TaylorTable:
 
 
 def test_scales_are_powers_of_two_that_fill_the_range_of_half_floats(table: TaylorTable) -> None:
-    scale = taylor_storage.scales(table, "half")
+    scale = storage.scales(table, "half")
     mantissa, _ = np.frexp(scale)
     assert np.all(mantissa == 0.5)
     peak = np.abs(table.values).max(axis=(0, 1, 2)) / scale
@@ -42,17 +42,17 @@ def test_scales_are_powers_of_two_that_fill_the_range_of_half_floats(table: Tayl
 def test_an_empty_or_vanishing_plane_has_a_scale(table: TaylorTable) -> None:
     for value in (0.0, 1e-44):
         values = np.full_like(table.values, value)
-        scale = taylor_storage.scales(replace(table, values=values), "half")
+        scale = storage.scales(replace(table, values=values), "half")
         assert np.all(np.isfinite(values / scale.astype(np.float32)))
 
 
 def test_float_is_stored_as_it_is(table: TaylorTable) -> None:
-    assert np.all(taylor_storage.scales(table, "float") == 1.0)
+    assert np.all(storage.scales(table, "float") == 1.0)
 
 
 def test_half_floats_keep_eleven_bits(table: TaylorTable) -> None:
-    scale = taylor_storage.scales(table, "half")
-    error = np.abs(taylor_storage.in_half(table, scale).values - table.values)
+    scale = storage.scales(table, "half")
+    error = np.abs(storage.in_half(table, scale).values - table.values)
     assert np.all(error <= np.maximum(2.0**-11 * np.abs(table.values), 2.0**-25 * scale))
 
 
@@ -64,7 +64,7 @@ def test_a_half_bundle_has_the_error_that_it_states(bake: Baker, tmp_path: Path)
     manifest = manifest_of(folder)
     with OpenEXR.File(str(folder / manifest.tables[0].file), separate_channels=True) as file:
         assert {channel.pixels.dtype for channel in file.channels().values()} == {np.dtype(np.float16)}
-    wi, wr = random_pairs(None, 2000, taylor_storage._SEED)
+    wi, wr = random_pairs(None, 2000, storage._SEED)
     exact = table_evaluator(taylor_table.load(inputs["table"]), config.radiometry)
     evaluate = open_bundle(folder).xyz
     mirrored = wi * [-1.0, -1.0, 1.0]

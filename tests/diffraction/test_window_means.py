@@ -10,8 +10,8 @@ from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
 from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.planning import plan
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning import plan
 
 SIGMA = 1.5
 

@@ -51,5 +51,5 @@ def test_no_gap_stays_empty(missing: str) -> None:
 
 
 def test_markdown_takes_values_as_they_are() -> None:
-    text = template.markdown("pipeline.report", "page.html.in", title="A < B & 'C'", subtitle="")
+    text = template.markdown(("pipeline.report",), "page.html.in", title="A < B & 'C'", subtitle="")
     assert "<h1>A < B & 'C'</h1>" in text

@@ -8,8 +8,8 @@ from pipeline.config.read import parse
 from pipeline.diffraction.reference import MeanReference
 from pipeline.surface import recipes, windows
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.planning import plan
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.planning import plan
 
 SIGMA = 2.0
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.accuracy import certificate
 from pipeline.diffraction import power_spectrum
 from pipeline.optics import geometry
+from pipeline.stages.polar import certificate
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
-from pipeline.tables.planning import anisotropy as scattering
+from pipeline.tables.polar.planning import anisotropy as scattering
 from tests.tables.planned import SIGMA, config, exact_of, planned
 
 pytestmark = pytest.mark.slow

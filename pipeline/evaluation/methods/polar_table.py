@@ -11,10 +11,10 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import in_band
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
-from pipeline.tables.planning import plan
-from pipeline.tables.planning.plan import Budget, Plan
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning import plan
+from pipeline.tables.polar.planning.plan import Budget, Plan
 from pipeline.tables.polar.spectral import SpectralTable
 
 

@@ -18,12 +18,12 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.planning import plan
-from pipeline.tables.planning.plan import Budget, Plan
 from pipeline.tables.polar import line_points, spectral_integral
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning import plan
+from pipeline.tables.polar.planning.plan import Budget, Plan
 
 # what the terms, nodes and wavelengths of every polar table here are chosen for; its grid is given
 BUDGET = Budget(0.1, 7500.0)

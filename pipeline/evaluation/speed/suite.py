@@ -6,8 +6,8 @@ import numpy as np
 
 from pipeline.accuracy.checks import MAP_SIZE, RelativeError, relative_error
 from pipeline.arrays import Array
-from pipeline.bundle import polar_storage
-from pipeline.bundle.polar_storage import Stored
+from pipeline.bundle.polar import storage
+from pipeline.bundle.polar.storage import Stored
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.evaluation import plain_numpy
@@ -263,7 +263,7 @@ class _Suite:
 
             def store(count: int = count) -> Stored:
                 whole_or_less = whole(baked.table) if count == most else compress(baked.table, count, None)
-                return polar_storage.store(whole_or_less, "half")
+                return storage.store(whole_or_less, "half")
 
             stored, seconds = timed(store)
             settings, error = {**settings_of(MAIN), "textures": count}, self._truth.error_of_textures(stored.textures)

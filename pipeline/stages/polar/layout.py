@@ -1,24 +1,25 @@
 """The polar layout: rings and azimuths of splines, Chebyshev polynomials in |w|."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from pipeline.accuracy.convergence import CoarseMap, PolarStudy, Study
+from pipeline.accuracy.convergence import CoarseMap, Study
+from pipeline.arrays import Array
 from pipeline.config.models import Config
+from pipeline.stages.foreseen import WayOut
 from pipeline.stages.layout import Layout
 from pipeline.stages.polar import power_spectrum, sizes, table, textures
+from pipeline.stages.polar.study import PolarStudy
 from pipeline.stages.stage import Inputs, Summary
+from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import Evaluator
+from pipeline.tables.polar import spectral
 
 if TYPE_CHECKING:
-    from pipeline.bundle.prepared import Prepared
+    from pipeline.bundle.layout import Prepared
 
 _PLANNED = ("terms", "s_nodes", "w_terms", "probed_delta_e", "windows", "speckle_contrast")
-
-
-def _size(config: Config) -> str:
-    layout = power_spectrum.layout_of(config)
-    return f"{layout.rings} rings x {layout.azimuths} azimuths"
 
 
 def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
@@ -50,10 +51,24 @@ def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
     ]
 
 
-def _prepare(config: Config, inputs: Inputs) -> "Prepared":
-    from pipeline.bundle import polar
+def _stored(config: Config, loss: dict[str, Any]) -> list[list[str]]:
+    mirror, verdict = loss["added_in_mirror"]["mean"], "kept" if loss["mirror_kept"] else "visibly changed"
+    return [
+        ["stored in", f"{config.publish.precision}, {loss['textures']} of {loss['most_textures']} textures"],
+        ["mean ΔE that this adds", f"{loss['added']['mean']:.3g} at {loss['added']['exposure_ru']:g} RU"],
+        ["mean ΔE in mirror directions at 1 RU", f"{mirror:.3g}: the highlight is {verdict}"],
+    ]
 
-    return polar.prepare(
+
+def _at_wavelengths(artifact: Artifact) -> Callable[[Array, Array], Array]:
+    table = spectral.build(power_spectrum.load(artifact))
+    return lambda uvw, lambda_nm: spectral.look_up(table, uvw, lambda_nm)
+
+
+def _prepare(config: Config, inputs: Inputs) -> "Prepared":
+    from pipeline.bundle.polar import prepare
+
+    return prepare.prepare(
         config,
         textures.of(inputs),
         inputs.summary("textures"),
@@ -68,10 +83,17 @@ LAYOUT = Layout(
     load=table.load,
     table_of=table.of,
     stored_of=textures.table_of,
-    size=_size,
     study=_study,
     study_remark="Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked.",
     sizes=sizes.sizes,
+    ways_out=(
+        WayOut("table.azimuths", 32, multiple=32),
+        WayOut("table.rings", 8, multiple=1),
+        WayOut("table.w_terms", 4, multiple=4),
+        WayOut("table.terms", 2, multiple=1),
+    ),
     settings=_settings,
+    stored=_stored,
     prepare=_prepare,
+    at_wavelengths=_at_wavelengths,
 )

@@ -17,8 +17,8 @@ from pipeline.stages.stage import Inputs, Stage, Summary, kernel_digest, scene_p
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.surface import windows
-from pipeline.tables.planning import plan
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning import plan
 
 _FILE = "power_spectrum.zarr"
 # the kernels from the stack to a table: the plan measures errors of tables
@@ -127,4 +127,8 @@ def _on_a_cache_line(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return placed
 
 
-POWER_SPECTRUM = Stage("power_spectrum", 4, ("surface",), _parameters, _produce, uses_device=True)
+def _work(config: Config) -> str:
+    return f"a grid for a mean dE of {config.budget_delta_e:g}"
+
+
+POWER_SPECTRUM = Stage("power_spectrum", 4, ("surface",), _parameters, _produce, uses_device=True, work=_work)

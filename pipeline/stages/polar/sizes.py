@@ -5,24 +5,26 @@ from math import sqrt
 
 from pipeline import resources
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
-from pipeline.bundle import polar_storage
+from pipeline.bundle.polar import storage
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction import power_spectrum as spectrum
 from pipeline.diffraction.polar_grid import Rings
 from pipeline.resources import Arrays, Need, largest
-from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, spare
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, process, spare
 from pipeline.stages.polar import power_spectrum
 from pipeline.store.arrays import loading_bytes, saving_bytes
-from pipeline.tables.planning import plan
-from pipeline.tables.planning.grid_search import Grids
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.bake import PolarBake
+from pipeline.tables.polar.planning import plan
+from pipeline.tables.polar.planning.grid_search import Grids
 from pipeline.tables.polar.spectral_integral import IntegralSize
 
 # tables that the search for a grid measures, and tables of the curves that `validate` shows
 _SEARCHED, _STUDIED = 6, 15
 # terms in |w| of the largest of these curves
 _STUDIED_W_TERMS = 12
+# of the process in the stage "power_spectrum", measured as those of the stages that all layouts have
+_TRANSFORM_BYTES = 325 * resources.MIB
 
 
 def sizes(foreseen: Foreseen) -> LayoutSizes:
@@ -42,8 +44,8 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
     stack = chosen.chebyshev_bytes(spectrum.filled_terms(bake.terms), 4)
     freed_bytes = stack["stack"] + stack["terms between two transforms"] + (e_bytes if searched else 0)
     freed_bytes += sum(tried.values()) + integral.weights_bytes
-    is_whole = polar_storage.is_whole(config)
-    choosing = {"textures": polar_storage.choosing_bytes(integral.table_bytes, bake.w_terms, config.publish)}
+    is_whole = storage.is_whole(config)
+    choosing = {"textures": storage.choosing_bytes(integral.table_bytes, bake.w_terms, config.publish)}
     choosing |= reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material)
     return LayoutSizes(
         transform=_transform(foreseen, bake, azimuths, chosen, integral, searched),
@@ -73,7 +75,7 @@ def _transform(
     e_seconds = _gather_seconds(bake, azimuths, chosen.reach) * foreseen.windows
     return Need(
         {
-            **base("power_spectrum"),
+            **process(_TRANSFORM_BYTES),
             **_transforming(foreseen, bake, azimuths, chosen, integral.arrays() if searched else {}),
         },
         resources.seconds(chebyshev_work(chosen, filled) * foreseen.windows)

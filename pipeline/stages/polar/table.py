@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.polar import power_spectrum
+from pipeline.stages.polar import certificate, power_spectrum
 from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest
 from pipeline.store import arrays
 from pipeline.store.store import Artifact
@@ -87,4 +86,9 @@ def grid_of(artifact: Artifact) -> PolarGrid:
     return PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
 
 
-TABLE = Stage("table", 6, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True)
+def _work(config: Config) -> str:
+    layout = power_spectrum.layout_of(config)
+    return f"{layout.rings} rings x {layout.azimuths} azimuths"
+
+
+TABLE = Stage("table", 6, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)

@@ -10,13 +10,21 @@ from pipeline.config.models import Config
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.polar import table
-from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest, scene_parameters
+from pipeline.stages.stage import (
+    Inputs,
+    Stage,
+    Summary,
+    colour_parameters,
+    kernel_digest,
+    scene_parameters,
+    textures_work,
+)
 from pipeline.store import arrays
 from pipeline.tables.evaluate import Table
 from pipeline.tables.polar.compression import Envelope, Textures, whole
 
 if TYPE_CHECKING:
-    from pipeline.bundle.polar_storage import Stored
+    from pipeline.bundle.polar.storage import Stored
 
 _FILE = "textures.zarr"
 
@@ -32,13 +40,13 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    from pipeline.bundle import polar_storage
+    from pipeline.bundle.polar import storage
 
     certificate = inputs.summary("table")["certificate"]
-    if polar_storage.is_whole(config):
+    if storage.is_whole(config):
         return {"loss": None, "certificate": certificate}
     reference = surface.reference_of(config, inputs, progress)
-    stored, loss, random = polar_storage.choose(config, table.of(inputs), reference)
+    stored, loss, random = storage.choose(config, table.of(inputs), reference)
     arrays.save(
         folder / _FILE,
         {
@@ -49,7 +57,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         {"envelope": asdict(stored.textures.envelope)},
     )
     inputs.session.keep("textures", stored)
-    measured = polar_storage.mean_error(random, config)
+    measured = storage.mean_error(random, config)
     kept = measured <= config.budget_delta_e
     return {
         "loss": loss.model_dump(mode="json"),
@@ -64,10 +72,10 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 def of(inputs: Inputs) -> "Stored":
     """Returns the stored textures of a stage's inputs."""
-    from pipeline.bundle import polar_storage
+    from pipeline.bundle.polar import storage
 
     if inputs.summary("textures")["loss"] is None:
-        return polar_storage.store(whole(table.of(inputs)), "float")
+        return storage.store(whole(table.of(inputs)), "float")
     return inputs.session.get("textures", lambda: _load(inputs))
 
 
@@ -79,7 +87,7 @@ def table_of(inputs: Inputs) -> Table:
 
 
 def _load(inputs: Inputs) -> "Stored":
-    from pipeline.bundle.polar_storage import Stored
+    from pipeline.bundle.polar.storage import Stored
 
     zarr = inputs["textures"].folder / _FILE
     values, scale, basis = (arrays.load(zarr, name) for name in ("texels", "scale", "basis"))
@@ -88,4 +96,4 @@ def _load(inputs: Inputs) -> "Stored":
     return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
 
 
-TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True)
+TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

@@ -1,23 +1,20 @@
 """The layout of the paper: I_p(u, v) on a grid that is fine near the origin."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pipeline.accuracy.convergence import CoarseMap, Study, TaylorStudy
+from pipeline.accuracy.convergence import CoarseMap, Study
 from pipeline.config.models import Config
+from pipeline.stages.foreseen import WayOut
 from pipeline.stages.layout import Layout
 from pipeline.stages.stage import Inputs, Summary
 from pipeline.stages.taylor import sizes, stack, table, textures
+from pipeline.stages.taylor.study import TaylorStudy
 from pipeline.tables.evaluate import Evaluator
 
 if TYPE_CHECKING:
-    from pipeline.bundle.prepared import Prepared
+    from pipeline.bundle.layout import Prepared
 
 _PREDICTED = ("order", "predicted_error", "truncation", "float32_rounding")
-
-
-def _size(config: Config) -> str:
-    layout = stack.layout_of(config)
-    return f"{layout.resolution}² nodes x {layout.step_nm:g} nm steps"
 
 
 def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
@@ -42,10 +39,14 @@ def _settings(stack: Summary, table: Summary) -> list[list[str]]:
     ]
 
 
-def _prepare(config: Config, inputs: Inputs) -> "Prepared":
-    from pipeline.bundle import taylor
+def _stored(_config: Config, loss: dict[str, Any]) -> list[list[str]]:
+    return [["stored in", f"half floats, which change colours by at most ΔE {loss['largest_delta_e']:.2g}"]]
 
-    return taylor.prepare(
+
+def _prepare(config: Config, inputs: Inputs) -> "Prepared":
+    from pipeline.bundle.taylor import prepare
+
+    return prepare.prepare(
         config,
         table.of(inputs),
         inputs.summary("textures"),
@@ -60,10 +61,15 @@ LAYOUT = Layout(
     load=table.load,
     table_of=table.of,
     stored_of=textures.table_of,
-    size=_size,
     study=_study,
     study_remark="Terms and step are varied at the directions of the map itself, without a grid.",
     sizes=sizes.sizes,
+    ways_out=(
+        WayOut("table.resolution", 3, multiple=2, odd=True),
+        WayOut("table.step_nm", 50.0, rises=True),
+        WayOut("table.terms", 2, multiple=1),
+    ),
     settings=_settings,
+    stored=_stored,
     prepare=_prepare,
 )

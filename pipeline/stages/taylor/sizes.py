@@ -4,10 +4,10 @@ from math import ceil
 
 from pipeline import resources
 from pipeline.accuracy.checks import RANDOM_DIRECTIONS
-from pipeline.bundle import taylor_storage
+from pipeline.bundle.taylor import storage
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.resources import Need, largest
-from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, spare
+from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, process, spare
 from pipeline.stages.taylor import stack
 from pipeline.store.arrays import saving_bytes
 from pipeline.tables.evaluate import look_up_bytes
@@ -15,6 +15,8 @@ from pipeline.tables.taylor import table as taylor
 
 # nodes of the tables and directions of the maps that `validate` computes for its curves
 _STUDIED_NODES = 5 * 201**2 // 2 + 12 * 2900
+# of the process in the stage "stack", measured as those of the stages that all layouts have
+_TRANSFORM_BYTES = 300 * resources.MIB
 
 
 def sizes(foreseen: Foreseen) -> LayoutSizes:
@@ -28,7 +30,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
     stack_bytes = chosen.stack_bytes(terms, 8)
     made = {"stack": stack_bytes, "writing": saving_bytes(stack_bytes)}
     transform = Need(
-        {**base("stack"), "height field": extent.bytes, **largest(chosen.taylor_bytes(terms), made)},
+        {**process(_TRANSFORM_BYTES), "height field": extent.bytes, **largest(chosen.taylor_bytes(terms), made)},
         resources.seconds(20.0 * terms * chosen.samples[0] * chosen.samples[1] * 10.0),
     )
     table_bytes = taylor.values_bytes(layout.resolution, terms)
@@ -60,7 +62,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
     study = {"stack": stack_bytes, **taylor.building_arrays(other, terms, chosen)}
     in_half = config.publish.precision == "half"
     answering = reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material)
-    storing = largest({"tables in half floats": taylor_storage.measuring_bytes(table_bytes)}, answering)
+    storing = largest({"tables in half floats": storage.measuring_bytes(table_bytes)}, answering)
     return LayoutSizes(
         transform=transform,
         table=table,
@@ -70,7 +72,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         study=Need(study, taylor.seconds(_STUDIED_NODES, wavelengths, terms, chosen)),
         textures=Need(storing if in_half else {}, reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths)),
         stored_bytes=table_bytes if in_half else 0,
-        prepared=Need({"images": taylor_storage.planes_bytes(layout.resolution)}),
+        prepared=Need({"images": storage.planes_bytes(layout.resolution)}),
     )
 
 

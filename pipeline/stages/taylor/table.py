@@ -76,4 +76,9 @@ def load(artifact: Artifact) -> taylor.TaylorTable:
     return taylor.TaylorTable(values, computed, unknown, float(arrays.attributes(zarr)["power"]))
 
 
-TABLE = Stage("table", 3, ("surface", "stack"), _parameters, _produce, uses_device=True)
+def _work(config: Config) -> str:
+    layout = stack.layout_of(config)
+    return f"{layout.resolution}² nodes x {layout.step_nm:g} nm steps"
+
+
+TABLE = Stage("table", 3, ("surface", "stack"), _parameters, _produce, uses_device=True, work=_work)

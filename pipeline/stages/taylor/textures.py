@@ -8,7 +8,15 @@ from pipeline.accuracy import certificate
 from pipeline.config.models import Config
 from pipeline.progress import Progress
 from pipeline.stages import surface
-from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest, scene_parameters
+from pipeline.stages.stage import (
+    Inputs,
+    Stage,
+    Summary,
+    colour_parameters,
+    kernel_digest,
+    scene_parameters,
+    textures_work,
+)
 from pipeline.stages.taylor import table
 from pipeline.tables.evaluate import interpolator
 from pipeline.tables.taylor.table import TaylorTable
@@ -26,12 +34,12 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, _folder: Path, progress: Progress) -> Summary:
     if config.publish.precision == "float":
         return {"loss": None, "certificate": inputs.summary("table")["certificate"]}
-    from pipeline.bundle import taylor_storage
+    from pipeline.bundle.taylor import storage
 
     baked = table.of(inputs)
-    scale = taylor_storage.scales(baked, "half")
-    loss = taylor_storage.measure(config, baked, scale)
-    rounded = taylor_storage.in_half(baked, scale)
+    scale = storage.scales(baked, "half")
+    loss = storage.measure(config, baked, scale)
+    rounded = storage.in_half(baked, scale)
     reference = surface.reference_of(config, inputs, progress)
     certified = certificate.measure(interpolator(rounded, config.radiometry), reference, config, progress)
     inputs.session.keep("textures", rounded)
@@ -43,9 +51,9 @@ def table_of(inputs: Inputs) -> TaylorTable:
     baked = table.of(inputs)
     if inputs.summary("textures")["loss"] is None:
         return baked
-    from pipeline.bundle import taylor_storage
+    from pipeline.bundle.taylor import storage
 
-    return inputs.session.get("textures", lambda: taylor_storage.in_half(baked, taylor_storage.scales(baked, "half")))
+    return inputs.session.get("textures", lambda: storage.in_half(baked, storage.scales(baked, "half")))
 
 
-TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True)
+TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

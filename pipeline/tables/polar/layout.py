@@ -4,20 +4,17 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from pipeline.optics.light import FINE_STEP_NM
-from pipeline.validated import Validated
+from pipeline.tables.settings import LayoutSettings
 
 
-class PolarLayout(Validated):
+class PolarLayout(LayoutSettings):
     """B-splines over rings and azimuths, Chebyshev polynomials in |w|; "auto" values follow from [accuracy].
 
     form: "xyz", or "spectral", whose power spectrum is also fine enough for single wavelengths.
     """
 
-    # |P|^2 is the mean over all windows of the scan, and a metal's reflectance is part of the table
     averages_windows: ClassVar[bool] = True
     holds_metals: ClassVar[bool] = True
-    # a bundle may compress the table to few textures
     compresses: ClassVar[bool] = True
 
     layout: Literal["polar"] = "polar"
@@ -28,11 +25,6 @@ class PolarLayout(Validated):
     form: Literal["xyz", "spectral"] = "xyz"
 
     @property
-    def integral_step_nm(self) -> float | None:
-        """Step of the spectral integral, nm; None, since every ring has its own."""
-        return None
-
-    @property
-    def mean_step_nm(self) -> float:
-        """Step of the means over wavelength that are taken outside the spectral integral, nm."""
-        return FINE_STEP_NM
+    def holds_wavelengths(self) -> bool:
+        """Whether the power spectrum is fine enough for single wavelengths."""
+        return self.form == "spectral"

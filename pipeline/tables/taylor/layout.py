@@ -1,19 +1,15 @@
 """The settings of the paper's table."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
 from pipeline.diffraction.expansion import LARGEST_TOLERANCE
-from pipeline.validated import Validated
+from pipeline.tables.settings import LayoutSettings
 
 
-class TaylorLayout(Validated):
+class TaylorLayout(LayoutSettings):
     """The paper's table: I_p on `resolution` x `resolution` nodes 2 |t|^power sign(t)."""
-
-    averages_windows: ClassVar[bool] = False
-    holds_metals: ClassVar[bool] = False
-    compresses: ClassVar[bool] = False
 
     layout: Literal["taylor"]
     resolution: Annotated[int, Field(ge=3, le=4001)] = 501

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, relative_error
 from pipeline.arrays import Array
 from pipeline.bundle import half
-from pipeline.bundle.manifest import TaylorLoss
+from pipeline.bundle.taylor.layout import TaylorLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import delta_e

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
-from pipeline.bundle.manifest import PolarGridEntry, PolarImage, PolarLoss
-from pipeline.bundle.polar_storage import Stored
-from pipeline.bundle.prepared import Prepared, Texture
+from pipeline.bundle.layout import Pixels, Prepared, TableImage
+from pipeline.bundle.polar.layout import PolarGridEntry, PolarImage, PolarLoss
+from pipeline.bundle.polar.storage import Stored
 from pipeline.config.models import Config
 from pipeline.report import images
 from pipeline.tables.polar.compression import CHANNELS, Textures
@@ -91,7 +91,7 @@ def grid_entry(textures: Textures) -> PolarGridEntry:
     )
 
 
-def _images(config: Config, stored: Stored) -> Iterator[Texture]:
+def _images(config: Config, stored: Stored) -> Iterator[tuple[TableImage, Pixels]]:
     """Yields the entry and the pixels (rings, azimuths, RGBA) of tables/T_00.exr, tables/T_01.exr, ..."""
     in_half = config.publish.precision == "half"
     for q in range(stored.textures.count):

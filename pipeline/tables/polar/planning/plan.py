@@ -18,10 +18,10 @@ from pipeline.optics.material import Material
 from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
-from pipeline.tables.planning.grid_search import GridSearch
-from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning.grid_search import GridSearch
+from pipeline.tables.polar.planning.trial import Trial
 
 # relative error allowed in each approximation, per unit of the budget in dE
 AMPLITUDE_SHARE = 1e-4  # of P, by truncation of the series and by the cut of the window

@@ -11,7 +11,7 @@ from pipeline.accuracy.certificate import refuse_clamping
 from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, RandomCheck, check_random, relative_error
 from pipeline.arrays import Array
 from pipeline.bundle import half
-from pipeline.bundle.manifest import PolarLoss
+from pipeline.bundle.polar.layout import PolarLoss
 from pipeline.config.models import Config, Publish
 from pipeline.diffraction.reference import MeanReference
 from pipeline.errors import AccuracyError

@@ -13,11 +13,11 @@ from pipeline import resources
 from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.scene import Scene
-from pipeline.tables.planning.anisotropy import anisotropy
-from pipeline.tables.planning.probes import Probes
-from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning.anisotropy import anisotropy
+from pipeline.tables.polar.planning.probes import Probes
+from pipeline.tables.polar.planning.trial import Trial
 
 _GRID_SHARE = 0.65  # share of the budget for the error at the test directions
 # start of the search: the grid that keeps a dE of 0.1 on snake scans with sigma = 16.25 um

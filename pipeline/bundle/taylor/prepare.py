@@ -8,9 +8,9 @@ from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
 from pipeline.arrays import Array
-from pipeline.bundle import taylor_storage
-from pipeline.bundle.manifest import TaylorGridEntry, TaylorImage, TaylorLoss
-from pipeline.bundle.prepared import Prepared, Texture
+from pipeline.bundle.layout import Pixels, Prepared, TableImage
+from pipeline.bundle.taylor import storage
+from pipeline.bundle.taylor.layout import TaylorGridEntry, TaylorImage, TaylorLoss
 from pipeline.config.models import Config
 from pipeline.report import images
 from pipeline.tables.taylor import grid
@@ -33,7 +33,7 @@ def prepare(config: Config, table: TaylorTable, summary: dict[str, Any], plan: d
     config: its [publish] is read. table: as baked. summary: of the stage "textures". plan: for the manifest.
     Returns the layout's part of the bundle.
     """
-    scale = taylor_storage.scales(table, config.publish.precision)
+    scale = storage.scales(table, config.publish.precision)
     loss = None if summary["loss"] is None else TaylorLoss.model_validate_json(json.dumps(summary["loss"]))
     entry = TaylorGridEntry(
         layout="taylor", width=table.resolution, height=table.resolution, power=table.power, u_max=grid.U_MAX
@@ -53,11 +53,13 @@ def prepare(config: Config, table: TaylorTable, summary: dict[str, Any], plan: d
     )
 
 
-def _images(config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss | None) -> Iterator[Texture]:
+def _images(
+    config: Config, table: TaylorTable, scale: Array, loss: TaylorLoss | None
+) -> Iterator[tuple[TableImage, Pixels]]:
     """Yields the entry and the pixels (v, u, RGBA) of tables/I_00.exr, tables/I_01.exr, ..."""
     stored = config.publish.precision
-    lost = None if loss is None else taylor_storage.subnormal_shares(table, scale)
-    for p, plane in enumerate(taylor_storage.planes(table, scale, stored)):
+    lost = None if loss is None else storage.subnormal_shares(table, scale)
+    for p, plane in enumerate(storage.planes(table, scale, stored)):
         image = TaylorImage(
             layout="taylor",
             file=f"tables/I_{p:02d}.exr",

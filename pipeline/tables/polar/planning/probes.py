@@ -8,10 +8,10 @@ from pipeline.optics import geometry
 from pipeline.optics.colour import delta_e
 from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Scene
-from pipeline.tables.planning.anisotropy import probing_angles
-from pipeline.tables.planning.trial import Trial
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.planning.anisotropy import probing_angles
+from pipeline.tables.polar.planning.trial import Trial
 
 # random directions are sorted by rho and divided into _SHARES rings of equal number, of which the _INNERMOST and one
 # of every _EVERY others are used: few directions lie on the flank of the specular lobe, where errors are a hundred

@@ -1,0 +1,1 @@
+"""Polar tables in bundles: textures of spline coefficients, their storage and their look-up."""
