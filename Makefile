@@ -17,7 +17,7 @@ help:
 	@echo "make bench                   measure run time against error of every algorithm: table, plots, verdicts"
 	@echo "make validation              compare every method with the literature's figures and theory: pages, verdicts"
 	@echo "make test                    set up, then run linters and every test"
-	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
+	@echo "make test-fast               set up, then run every test that is not marked slow: 90 seconds on two cores"
 	@echo "make test-avx2               run the kernels' tests and two bakes as on a processor without AVX-512"
 	@echo "make fuzz                    read 5000 mutated scans: each a reading or one line, in 5 s and 1 GB (COUNT=, SEED=)"
 	@echo "make lint                    run ruff and mypy"
@@ -109,11 +109,17 @@ format: $(VENV)/ready
 	$(VENV)/bin/ruff check --fix .
 	$(VENV)/bin/ruff format .
 
+# Much of the suite is one thread at a time, so two workers share it. Tests marked `alone` hold a limit of time on the
+# clock and run after the others, without a neighbour.
+PYTEST := $(VENV)/bin/python -m pytest
+SHARED := --numprocesses $(or $(WORKERS),2) --dist worksteal
 test: setup glslang lint
-	$(VENV)/bin/python -m pytest
+	$(PYTEST) $(SHARED) -m "not alone"
+	$(PYTEST) -m alone
 
 test-fast: setup glslang
-	$(VENV)/bin/python -m pytest -m "not slow"
+	$(PYTEST) $(SHARED) -m "not slow and not alone"
+	$(PYTEST) -m "alone and not slow"
 
 # half an hour on two cores; tests/cli/test_killing.py does a few of each
 KILLS ?= 300
