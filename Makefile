@@ -7,6 +7,9 @@ BAKE := $(VENV)/bin/diffract-bake
 INSTALL := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= out
 
+# hundreds of processes of the tests import the project: its compiled modules are kept
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup lock bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
 .PHONY: fuzz fuzz-bundles
