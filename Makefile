@@ -20,7 +20,7 @@ help:
 	@echo "make bench                   measure run time against error of every algorithm: table, plots, verdicts"
 	@echo "make validation              compare every method with the literature's figures and theory: pages, verdicts"
 	@echo "make test                    set up, then run linters and every test"
-	@echo "make test-fast               set up, then run every test that is not marked slow: 90 seconds on two cores"
+	@echo "make test-fast               set up, then run every test that is not marked slow: two minutes on two cores"
 	@echo "make test-avx2               run the kernels' tests and two bakes as on a processor without AVX-512"
 	@echo "make fuzz                    read 5000 mutated scans: each a reading or one line, in 5 s and 1 GB (COUNT=, SEED=)"
 	@echo "make lint                    run ruff and mypy"
