@@ -7,6 +7,9 @@ BAKE := $(VENV)/bin/diffract-bake
 INSTALL := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= out
 
+# hundreds of processes of the tests import the project: its compiled modules are kept
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup lock bake pipeline bench validation test test-fast test-avx2 lint format coverage profile clean
 .PHONY: fuzz fuzz-bundles
@@ -109,11 +112,17 @@ format: $(VENV)/ready
 	$(VENV)/bin/ruff check --fix .
 	$(VENV)/bin/ruff format .
 
+# Much of the suite is one thread at a time, so two workers share it. Tests marked `alone` hold a limit of time on the
+# clock and run after the others, without a neighbour.
+PYTEST := $(VENV)/bin/python -m pytest
+SHARED := --numprocesses $(or $(WORKERS),2) --dist worksteal
 test: setup glslang lint
-	$(VENV)/bin/python -m pytest
+	$(PYTEST) $(SHARED) -m "not alone"
+	$(PYTEST) -m alone
 
 test-fast: setup glslang
-	$(VENV)/bin/python -m pytest -m "not slow"
+	$(PYTEST) $(SHARED) -m "not slow and not alone"
+	$(PYTEST) -m "alone and not slow"
 
 # half an hour on two cores; tests/cli/test_killing.py does a few of each
 KILLS ?= 300

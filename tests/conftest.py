@@ -17,3 +17,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.parent.name in _PHYSICS:
             item.add_marker("physics")
+    # so that no worker of pytest-xdist begins one while the other has nothing left to do
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)

@@ -1,4 +1,4 @@
-"""What tests share: where real scans are, fields made of them, and processes that die at a moment asked for."""
+"""What tests share: real scans, fields made of them, reading without a child, and processes that die on request."""
 
 from pathlib import Path
 
@@ -7,6 +7,8 @@ import pytest
 
 from pipeline.surface.conditioning import condition
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.readers import limited, reading
+from pipeline.surface.scan import Scan
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -40,6 +42,15 @@ def shared_file(name: str) -> Path:
     if not path.is_file():
         pytest.skip(f"real scan {name} is not beside this checkout")
     return path
+
+
+def read_scans_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replaces the child process that reads a scan: each takes half a second to start."""
+
+    def read(path: Path, channel: str | None, _limits: limited.Limits) -> Scan:
+        return reading.read(path, channel)
+
+    monkeypatch.setattr(limited, "_by_child", read)
 
 
 def snake(name: str) -> HeightField:

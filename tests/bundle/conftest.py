@@ -92,14 +92,28 @@ def bake(tmp_path_factory: pytest.TempPathFactory) -> Baker:
 
 
 @pytest.fixture(scope="session")
-def whole(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return publish(small(), bake(small()), tmp_path_factory.mktemp("out"))
+def published(bake: Baker, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The small bundle of each layout: read it, change nothing."""
+    return {
+        layout: publish(small(layout), bake(small(layout)), tmp_path_factory.mktemp(layout)) for layout in LAYOUTS
+    }
+
+
+@pytest.fixture(scope="session")
+def whole(published: dict[str, Path]) -> Path:
+    return published["taylor"]
 
 
 @pytest.fixture
 def bundle(whole: Path, tmp_path: Path) -> Path:
     """A copy that a test may damage."""
     return Path(shutil.copytree(whole, tmp_path / whole.name))
+
+
+@pytest.fixture
+def polar_bundle(published: dict[str, Path], tmp_path: Path) -> Path:
+    """A copy that a test may damage."""
+    return Path(shutil.copytree(published["polar"], tmp_path / published["polar"].name))
 
 
 def forged(folder: Path, damage: Callable[[Path], None]) -> Path:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import struct
 import time
 from pathlib import Path
@@ -33,17 +34,20 @@ IMPOSSIBLE: dict[str, list[dict[str, Any]]] = {
         {"report": "../../../etc/passwd"},
         {"maps__0__png": "../../../etc/passwd"},
         {"maps__0__png": "maps/none.png"},
-        {"maps__0__file": "tables/I_00.exr"},
         {"name": "../../elsewhere"},
         {"grid__power": 10**400},
         {"coverage__skipped_share": -1},
         {"provenance__config": {"scene": {"lights": 5}}},
+        {"grid__width": 0},
+        {"grid__u_max": 1e-320},
+        {"tables__0__file": "/etc/passwd"},
     ],
     "polar": [
         {"grid__r0": 1e-320},
         {"grid__step": 1e-320},
         {"grid__step": 0.1},
         {"grid__axis_rad": float("nan")},
+        {"grid__axis_rad": float("inf")},
         {"grid__axis_rad": 1e300},
         {"grid__stretch": 0},
         {"grid__envelope_radius": 0},
@@ -56,11 +60,22 @@ IMPOSSIBLE: dict[str, list[dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize(("layout", "changes"), [(layout, c) for layout in LAYOUTS for c in IMPOSSIBLE[layout]])
-def test_impossible_numbers_are_found(bake: Baker, tmp_path: Path, layout: str, changes: dict[str, Any]) -> None:
-    folder = forged(publish(small(layout), bake(small(layout)), tmp_path), with_values(**changes))
+def test_impossible_values_are_found(
+    published: dict[str, Path], tmp_path: Path, layout: str, changes: dict[str, Any]
+) -> None:
+    copy = Path(shutil.copytree(published[layout], tmp_path / published[layout].name))
+    folder = forged(copy, with_values(**changes))
     faults = verify(folder)
-    assert faults
+    (key,) = (path.rpartition("__")[2] for path in changes)
+    assert any(key in fault or "expected numbers, got" in fault for fault in faults), faults
     assert all("\n" not in fault for fault in faults)
+    with pytest.raises(DamagedError):
+        open_bundle(folder)
+
+
+def test_an_image_that_is_named_twice_is_found(bundle: Path) -> None:
+    folder = forged(bundle, with_values(maps__0__file="tables/I_00.exr"))
+    assert "manifest.json: an image is named twice" in verify(folder)
     with pytest.raises(DamagedError):
         open_bundle(folder)
 
@@ -119,7 +134,7 @@ def test_zeros_a_thousand_times_as_large_are_not_decoded(
 
 
 @pytest.mark.parametrize(
-    "text", ["[" * 100_000, '{"a":' * 100_000, '{"name": "\\ud800"}', '{"a": NaN}', '{"a": 1e999}', "[]"]
+    "text", ["{", "[" * 100_000, '{"a":' * 100_000, '{"name": "\\ud800"}', '{"a": NaN}', '{"a": 1e999}', "[]"]
 )
 def test_a_manifest_that_is_no_manifest(bundle: Path, text: str) -> None:
     folder = forged(bundle, lambda folder: (folder / "manifest.json").write_text(text, encoding="utf-8") and None)

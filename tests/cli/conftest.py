@@ -1,5 +1,6 @@
 """Tools in folders of their own; one small bake shared by all that only read it."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -32,8 +33,14 @@ def baked(first_run: tuple[Tool, Result]) -> Tool:
 
 @pytest.fixture(scope="session")
 def published(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store for what configs/ and the validation bench hold, empty at first: each artifact is made once for all."""
-    return tmp_path_factory.mktemp("published")
+    """A store for what configs/ and the validation bench hold, empty at first: each artifact is made once for all.
+
+    Workers of pytest-xdist share it, as runs share a store: each has a folder of its own in one that is common.
+    """
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    return folder / "published"
 
 
 @pytest.fixture

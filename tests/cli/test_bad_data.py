@@ -12,11 +12,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from tests.cli.tool import Result, Tool, temporary_files
-from tests.support import shared_file
+from tests.support import read_scans_in_this_process, shared_file
 
 RNG = np.random.default_rng(1)
 HILLS = 0.05 * np.sin(np.arange(100) * 2 * np.pi / 20)[None, :] + 0.01 * RNG.random((100, 100))
 UNITS = {"pitch_um": 0.1, "height_unit": "um"}
+
+
+@pytest.fixture(autouse=True)
+def _read_in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if "real_bad_files" not in request.node.name:
+        read_scans_in_this_process(monkeypatch)
 
 
 def bake(tool: Tool, scan: Path, **keys: Any) -> Result:

@@ -9,7 +9,7 @@ from cli.sources import load
 from pipeline.evaluation.speed.bench import built_in
 from tests.cli.tool import Result, Tool, recipe
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
 
 @pytest.fixture(scope="module")

@@ -41,6 +41,7 @@ def start(work: str) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("work", [IN_C, IN_PYTHON, IN_A_CHILD])
 @pytest.mark.parametrize(
     ("sent", "line"),
@@ -64,6 +65,7 @@ def test_a_signal_ends_everything(work: str, sent: signal.Signals, line: str) ->
     assert took < 2.0
 
 
+@pytest.mark.alone
 def test_a_killed_supervisor_takes_the_command_with_it() -> None:
     with start(IN_C) as process:
         process.kill()

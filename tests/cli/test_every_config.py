@@ -11,6 +11,7 @@ CONFIGS = sorted((REPOSITORY / "configs").glob("*.toml"))
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_every_config_bakes(tool: Tool, published: Path, path: Path) -> None:
     name = tomllib.loads(path.read_text(encoding="utf-8"))["name"]

@@ -13,7 +13,7 @@ from tests.support import killed_at
 
 STAGES = ["surface", "stack", "table", "textures", "render", "validate"]
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 # a signal once validation is at work and has a file in its folder
 SIGNALLED = """
@@ -125,6 +125,7 @@ def test_two_runs_at_once_share_the_work(baked: Tool, tool: Tool, outs: tuple[st
     assert tool("store", "check").code == 0
 
 
+@pytest.mark.alone
 def test_a_few_of_the_kills_of_make_kills(tmp_path: Path) -> None:
     counts = kills.Counts()
     kills.sweep(tmp_path, kills=2, seed=5, longest_s=3.0, counts=counts)

@@ -31,6 +31,10 @@ _LINK = re.compile(r"\]\(([^)#:]+)[^):]*\)")
 SLOW = ("run configs/", "bench ")
 
 
+def marks(command: str) -> list[pytest.MarkDecorator]:
+    return [pytest.mark.slow, pytest.mark.long] if command.startswith(SLOW) else []
+
+
 def test_commands_are_found() -> None:
     lines = [line for line in GUIDE.splitlines() if re.match(r" {4,}\S*diffract-bake ", line)]
     assert len(lines) + 2 == len(COMMANDS) >= 15
@@ -39,9 +43,7 @@ def test_commands_are_found() -> None:
     assert {command.split()[0] for command in COMMANDS} == set(_COMMANDS)
 
 
-@pytest.mark.parametrize(
-    "command", [pytest.param(c, marks=pytest.mark.slow) if c.startswith(SLOW) else c for c in COMMANDS]
-)
+@pytest.mark.parametrize("command", [pytest.param(command, marks=marks(command)) for command in COMMANDS])
 def test_command(copy: Tool, published: Path, command: str) -> None:
     """Placeholders are in capitals and stand for files of one small bake; one that is new fails here."""
     shutil.copytree(REPOSITORY / "configs", copy.folder / "configs")

@@ -4,6 +4,7 @@ import re
 import time
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from pipeline.report import images
@@ -69,10 +70,11 @@ def test_report_is_one_file_with_pictures_and_numbers(baked: Tool) -> None:
     assert f"{measured['surface']['summary']['statistics']['sigma_h_um']:.4f}" in page
 
 
+@pytest.mark.alone
 def test_a_second_run_finds_all_cached_and_changes_nothing(baked: Tool) -> None:
     before = files(baked.out), baked.artifacts()
     seconds = []
-    # the fastest counts: other tests may keep this machine busy
+    # the fastest counts: other work may keep this machine busy
     for _ in range(3):
         started = time.perf_counter()
         result = baked.process("run", "small.toml")
