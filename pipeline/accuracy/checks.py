@@ -11,7 +11,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import MeanReference, Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
-from pipeline.optics.colour import ColourError, colour_errors, delta_e
+from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress, silent
@@ -65,8 +65,7 @@ class Clamped:
 
 def _clamped(config: Config, interpolated: Array) -> Clamped:
     unit, exposure = config.radiometry.unit, config.accuracy.exposure_ru
-    moved = delta_e(never_negative(interpolated) / unit, interpolated / unit, exposure)
-    cost = ColourError(exposure, float(moved.mean()), float(np.percentile(moved, 99.0)), float(moved.max()))
+    cost = colour_error(never_negative(interpolated) / unit, interpolated / unit, exposure)
     return Clamped(float(np.mean(np.any(interpolated < 0.0, axis=-1))), cost)
 
 

@@ -87,9 +87,11 @@ def colour_errors(xyz: Array, reference: Array, asked_ru: float) -> list[ColourE
     xyz, reference: (..., 3), linear, in RU. asked_ru: one more exposure, RU.
     Returns one entry per exposure, ascending.
     """
-    errors = []
-    for exposure in sorted({*EXPOSURES_RU, asked_ru}):
-        difference = delta_e(xyz, reference, exposure)
-        worst, tail = float(difference.max()), float(np.percentile(difference, 99.0))
-        errors.append(ColourError(exposure, float(difference.mean()), tail, worst))
-    return errors
+    return [colour_error(xyz, reference, exposure) for exposure in sorted({*EXPOSURES_RU, asked_ru})]
+
+
+def colour_error(xyz: Array, reference: Array, exposure_ru: float) -> ColourError:
+    """Measures the CIELAB difference over all directions at one exposure; the parameters are those of `delta_e`."""
+    difference = delta_e(xyz, reference, exposure_ru)
+    tail = float(np.percentile(difference, 99.0))
+    return ColourError(exposure_ru, float(difference.mean()), tail, float(difference.max()))

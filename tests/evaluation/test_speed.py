@@ -11,6 +11,8 @@ import pytest
 from kernels import device, peak
 from pipeline.accuracy.checks import relative_error
 from pipeline.config.models import Config
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.evaluation import plain_numpy
 from pipeline.evaluation.speed import checks, machine, memory, nufft, polar_bake, setting, transforms, work
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
@@ -51,6 +53,10 @@ CASES = {
 }
 
 
+def power_spectrum(of: Setting, built: Stack) -> PolarPowerSpectrum:
+    return of.bake.power_spectrum(built, of.plan.azimuths)
+
+
 @pytest.fixture(params=CASES)
 def case(request: pytest.FixtureRequest) -> Setting:
     field, chosen = CASES[request.param]
@@ -59,8 +65,8 @@ def case(request: pytest.FixtureRequest) -> Setting:
 
 def test_plain_numpy_gives_the_samples(case: Setting) -> None:
     """One texel after the other, from the same stack: what is left is E's interpolation."""
-    built = case.stack()
-    samples = case.samples(case.power_spectrum(built))
+    built = case.bake.stack(case.field)
+    samples = case.samples(power_spectrum(case, built))
     coefficients = plain_numpy.complex_coefficients(built)
     rho, phi = case.plan.rings.rho(), case.plan.azimuths.phi()
     for ring, azimuth in ((0, 5), (7, 40), (15, 90), (23, 61)):
@@ -73,7 +79,7 @@ def test_plain_numpy_gives_the_samples(case: Setting) -> None:
 
 def test_nufft_gives_the_samples(case: Setting) -> None:
     pytest.importorskip("finufft")
-    samples = case.samples(case.power_spectrum(case.stack()))
+    samples = case.samples(power_spectrum(case, case.bake.stack(case.field)))
     routed = nufft.run(case, 48, 1)
     # all of half a turn; the other half follows, for heights are real
     error = relative_error(routed.samples.astype(float), samples, 1e-4 * samples.max())
@@ -92,7 +98,7 @@ def test_the_stacks_transforms_agree(case: Setting) -> None:
     assert 0.0 < max(single.fftw_difference, single.scipy_difference) < 1e-6
     assert 0.0 < max(double.fftw_difference, double.scipy_difference) < 1e-14
     assert min(single.kernel_s, single.fftw_s, single.scipy_s) > 0.0
-    built = case.stack()
+    built = case.bake.stack(case.field)
     assert transforms.kept_of(built).shape == built.coefficients.shape[:2]
 
 
@@ -126,11 +132,11 @@ def test_the_power_spectrum_needs_what_its_loops_do() -> None:
     """Per radius and azimuth of half a turn: every tap of every term, complex, and every term at every node in s."""
     field, chosen = CASES["plain"]
     made = setting.make(field, chosen, PolarLayout(rings=24, azimuths=96))
-    built = made.stack()
+    built = made.bake.stack(made.field)
     taps = (2 * built.reach[0] + 1) * (2 * built.reach[1] + 1)
     per_pair = 2 * (taps * 2 * built.terms + 2 * built.terms * made.plan.s_nodes)
-    found = work.power_spectrum(made, built, made.power_spectrum(built))
-    assert found.flops == per_pair * len(made.radius_per_um) * 48
+    found = work.power_spectrum(made, built, power_spectrum(made, built))
+    assert found.flops == per_pair * len(made.bake.radius_per_um) * 48
     assert built.terms <= built.coefficients.shape[3]
 
 
@@ -198,7 +204,7 @@ def test_the_map_tells_a_good_table_from_a_bad_one() -> None:
     errors = []
     for rings, azimuths in ((16, 64), (80, 512)):
         made = setting.make(field, chosen, PolarLayout(rings=rings, azimuths=azimuths))
-        errors.append(truth.error(made.table(made.power_spectrum(made.stack()), made.light)).mean)
+        errors.append(truth.error(made.table(power_spectrum(made, made.bake.stack(made.field)))).mean)
     assert errors[1] < 0.3
     assert errors[0] > 5.0 * errors[1]
 

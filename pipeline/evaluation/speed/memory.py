@@ -50,15 +50,10 @@ def _bake(arguments: list[str]) -> int:
     """Make a table and return the peak memory of this process, bytes."""
     heights, pitch_x, pitch_y, config, layout = arguments
     field = HeightField(np.load(heights), (float(pitch_x), float(pitch_y)))
-    made, chosen = setting.first_bake(
-        field, Config.model_validate_json(config), PolarLayout.model_validate_json(layout)
-    )
-    chosen.table(made, chosen.light)
-    return _high_water_bytes()
-
-
-def _high_water_bytes() -> int:
-    """This process's own peak: getrusage's starts with the parent's memory at exec."""
+    models = Config.model_validate_json(config), PolarLayout.model_validate_json(layout)
+    made, chosen = setting.first_bake(field, *models)
+    chosen.table(made)
+    # the peak of getrusage starts with the parent's memory at exec
     status = Path("/proc/self/status").read_text(encoding="ascii")
     found = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
     assert found is not None

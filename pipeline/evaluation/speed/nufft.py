@@ -20,17 +20,21 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
-from math import pi
+from math import ceil, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
+from scipy.signal import resample
 
 from pipeline.arrays import Array
-from pipeline.evaluation.speed import nufft_modes
-from pipeline.evaluation.speed.nufft_modes import Complex, Modes
+from pipeline.evaluation.plain_numpy import chebyshev_terms
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of
+from pipeline.optics.coherence import reach_sigmas, sigma_f, window
+
+Complex = NDArray[np.complex64]
 
 _TOLERANCE = 1e-5
 _UPSAMPLING = (1.25, 2.0)
@@ -39,6 +43,17 @@ _UPSAMPLING = (1.25, 2.0)
 def available() -> bool:
     """Return whether the library is installed (the extra `bench`)."""
     return find_spec("finufft") is not None
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Samples g(x) T_n(h(x) / H) / sum g, n = 0, 1, ..: complex64 (terms, ny, nx), x = 0 at sample n // 2.
+
+    spacing_um: between samples along (x, y).
+    """
+
+    values: Complex
+    spacing_um: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -69,7 +84,7 @@ def points_of(setting: Setting) -> int:
 
 def run(setting: Setting, azimuths: int, repeats: int) -> NufftRun:
     """Time FINUFFT on the first `azimuths` of a table, each part the best of `repeats`."""
-    modes, modes_s = best_of(repeats, lambda: nufft_modes.make(setting))
+    modes, modes_s = best_of(repeats, lambda: modes_of(setting))
     fx, fy = _frequencies(setting, azimuths)
     tried = [_transform(modes, fx, fy, upsampling, repeats) for upsampling in _UPSAMPLING]
     best = min(tried, key=lambda t: t.fft_s + t.point_s * points_of(setting))
@@ -78,6 +93,28 @@ def run(setting: Setting, azimuths: int, repeats: int) -> NufftRun:
     series = [setting.series(ring) for ring in range(setting.plan.rings.count)]
     samples, integral_s = best_of(repeats, lambda: _integrate(setting, best.f_n, series))
     return NufftRun(modes_s + best.fft_s, best.point_s, integral_s / fx.size, fx.size, best.upsampling, samples)
+
+
+def modes_of(setting: Setting) -> Modes:
+    """Return the terms that the budget needs, low-passed, over the window as far as its cut."""
+    field, sigma_um, sigmas = setting.field, setting.bake.sigma_um, reach_sigmas(setting.bake.tolerance)
+    # the fewest samples of one period that carry every frequency that a view reaches under the window
+    edge = setting.plan.rings.rho_max / (1e-3 * setting.bake.lambda_min_nm) + sigmas * sigma_f(sigma_um)
+    fewest = (int(fft.next_fast_len(ceil(2.0 * edge * size_um), real=True)) for size_um in field.size_um)
+    mx, my = (min(n, few) for n, few in zip(field.shape[::-1], fewest, strict=True))
+    spacing_um = field.size_um[0] / mx, field.size_um[1] / my
+    reach = (ceil(sigmas * sigma_um / spacing) for spacing in spacing_um)
+    columns, rows = (np.arange(-r, r, dtype=np.float64) for r in reach)
+    g_x, g_y = window(columns * spacing_um[0], sigma_um), window(rows * spacing_um[1], sigma_um)
+    under = np.multiply.outer(g_y / g_y.sum(), g_x / g_x.sum()).astype(np.float32)
+    values = np.empty((setting.plan.terms, *under.shape), np.complex64)
+    t = np.fft.ifftshift(field.heights_um / field.half_range_um)
+    with fft.set_workers(os.cpu_count() or 1):
+        for value, term in zip(values, chebyshev_terms(t), strict=False):
+            low = resample(resample(term.astype(np.float32), mx, axis=1), my, axis=0)
+            # the patch repeats under the window
+            value[:] = under * low[np.ix_(rows.astype(int) % my, columns.astype(int) % mx)]
+    return Modes(values, spacing_um)
 
 
 def _frequencies(setting: Setting, azimuths: int) -> tuple[Array, Array]:

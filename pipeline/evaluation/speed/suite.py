@@ -191,7 +191,7 @@ class _Suite:
         return SurfaceSpeed(
             name=self._config.name,
             samples=self._field.shape,
-            sigma_um=main.sigma_um,
+            sigma_um=main.bake.sigma_um,
             map_size=effort.map_size,
             terms=main.plan.terms,
             nodes=main.plan.s_nodes,
@@ -266,7 +266,7 @@ class _Suite:
                 return storage.store(whole_or_less, "half")
 
             stored, seconds = timed(store)
-            settings, error = {**settings_of(MAIN), "textures": count}, self._truth.error_of_textures(stored.textures)
+            settings, error = {**settings_of(MAIN), "textures": count}, self._truth.error(stored.textures)
             total = baked.stages.total + seconds
             self._points.append(Point(TEXTURES, settings, self._main.plan.texels, total, stored.values.nbytes, error))
         self._progress("textures", 1.0)

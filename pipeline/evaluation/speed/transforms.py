@@ -13,7 +13,7 @@ from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.evaluation.plain_numpy import chebyshev_terms
 from pipeline.evaluation.speed.machine import Precision
-from pipeline.evaluation.speed.setting import AMPLITUDE, Setting
+from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.timing import best_of
 from pipeline.fourier.term_transforms import KeptCoefficients, transform
 
@@ -42,11 +42,12 @@ def measure(setting: Setting, repeats: int) -> list[Transforms]:
 
 
 def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms:
-    real, reach = _REAL[precision], float(setting.radius_per_um[-1])
+    real, bake, reach = _REAL[precision], setting.bake, float(setting.bake.radius_per_um[-1])
     terms, t = setting.plan.terms, np.fft.ifftshift(setting.field.heights_um) * dft_stack.scale_per_um(setting.field)
 
     def by_kernel() -> Stack:
-        return dft_stack.build(setting.field, "chebyshev", terms, setting.sigma_um, reach, AMPLITUDE, dtype=real)
+        window = bake.sigma_um, reach, bake.tolerance
+        return dft_stack.build(setting.field, "chebyshev", terms, *window, dtype=real)
 
     kept = kept_of(by_kernel())
     shape = (*kept.shape, 2, terms)

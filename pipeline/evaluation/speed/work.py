@@ -10,10 +10,11 @@ import numpy as np
 
 from kernels.programs import ORDER
 from pipeline.diffraction.dft_stack import Stack
-from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.diffraction.power_spectrum import PolarPowerSpectrum, s_max
 from pipeline.evaluation.speed.machine import Precision, Work
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.surface.heightfield import HeightField
+from pipeline.tables.polar import line_points
 from pipeline.tables.polar.table import PolarTable
 
 _SPLINE_TAPS = 12
@@ -72,7 +73,8 @@ def apply_operator(setting: Setting, made: PolarPowerSpectrum, table: PolarTable
 
 def _points(setting: Setting) -> tuple[float, float, float]:
     """Number of points of all groups of rings, of those between radii, and of those that all rings take together."""
-    points, taken = setting.points, 0
+    bake, rho, taken = setting.bake, setting.plan.rings.rho(), 0
+    points = line_points.choose(bake.radius_per_um, bake.s_nodes, s_max(bake.lambda_min_nm), rho, setting.rules)
     low, high = (points.stretch * kappa for kappa in setting.rules.kappa_ends_per_um)
     lines = np.split(points.kappa_per_um, points.first[1:])
     for ring, group in enumerate(points.group):
