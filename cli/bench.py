@@ -51,16 +51,14 @@ def speed_command(
     of each constant of the kernels; and the cost of compiling. Without CONFIGs: three synthetic surfaces.
     """
     from pipeline.evaluation.speed import bench
-    from pipeline.evaluation.speed.processes import CommandLine
     from pipeline.store import scratch
 
     scratch.require_folder(out)
-    command_line = CommandLine(COMMAND_LINE)
     with nullcontext(config_paths) if config_paths else bench.built_in() as paths:
         configs = [(sources.load(path), path) for path in paths]
         with console.showing_progress() as progress:
             store = console.open_store(store_root)
-            found = bench.run(configs, quick, store, command_line, progress, console.note)
+            found = bench.run(configs, quick, store, COMMAND_LINE, progress, console.note)
     if written := _write(found, out, as_json):
         _print_speed(found)
         for path in written:
@@ -229,8 +227,8 @@ def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:
             "differs ": lambda of: f"{of.scipy_difference:.0e}",
         },
     )
-    for name, agreement in (("FINUFFT", surface.agreement.nufft), ("plain numpy", surface.agreement.numpy)):
-        if agreement is not None:
+    for name, key in (("FINUFFT", "nufft"), ("plain numpy", "numpy")):
+        if agreement := surface.agreement[key]:
             console.say(
                 f"{name} and the kernels, on the polar table's samples: median difference {agreement.median:.1e}, "
                 f"99th percentile {agreement.percentile_99:.1e}"

@@ -13,7 +13,7 @@ from pipeline.evaluation.sources import as_published
 from pipeline.evaluation.speed import checks, constants, machine, memory, processes, setting, suite, truth
 from pipeline.evaluation.speed.constants import Constant
 from pipeline.evaluation.speed.machine import Machine, share
-from pipeline.evaluation.speed.processes import CommandLine, RunFailedError
+from pipeline.evaluation.speed.processes import RunFailedError
 from pipeline.evaluation.speed.suite import FULL, MAIN, QUICK, SurfaceSpeed
 from pipeline.evaluation.stability import sweep, verdict
 from pipeline.progress import Progress
@@ -78,14 +78,14 @@ def run(
     configs: Sequence[tuple[Config, Path]],
     quick: bool,
     store: Store,
-    command_line: CommandLine,
+    command_line: Sequence[str],
     progress: Progress,
     note: Callable[[str], None],
 ) -> SpeedResults:
     """Measure all surfaces and the machine.
 
     configs: with the files that hold them. quick: smaller maps and samples; no processes, no large scan.
-    command_line: how whole runs are started. note: called with the name of each part before it begins.
+    command_line: the words that start the tool, for whole runs. note: called with the name of each part.
     """
     note("device:")
     limits, found = machine.measure(), []
@@ -113,14 +113,14 @@ def _field(config: Config, store: Store, progress: Progress) -> HeightField:
     return surface.load(store.open("surface", made["surface"].key))
 
 
-def _with_whole_run(found: SurfaceSpeed, command_line: CommandLine, path: Path, progress: Progress) -> SurfaceSpeed:
+def _with_whole_run(found: SurfaceSpeed, command_line: Sequence[str], path: Path, progress: Progress) -> SurfaceSpeed:
     try:
         return replace(found, whole_run_s=processes.warm_run_s(command_line, path, progress))
     except RunFailedError as error:
         return replace(found, whole_run_fault=f"run --until table failed: {error}")
 
 
-def _compiling(command_line: CommandLine, progress: Progress) -> list[Check]:
+def _compiling(command_line: Sequence[str], progress: Progress) -> list[Check]:
     try:
         return checks.of_compiling(processes.measure_compiling(command_line, progress))
     except RunFailedError as error:

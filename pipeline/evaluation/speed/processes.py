@@ -3,11 +3,11 @@
 import os
 import shutil
 import subprocess
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 
 from pipeline.progress import Progress, silent
 from pipeline.store import scratch
@@ -50,35 +50,22 @@ class Spent:
     cpu_s: float
 
 
-@dataclass(frozen=True)
-class CommandLine:
-    """The words that start the tool, before the name of a command."""
+def run(words: Sequence[str], config: Path, cache: Path | None = None, until: str | None = None) -> Spent:
+    """Run a config with an empty store.
 
-    words: Sequence[str]
-
-    def run(self, config: Path, cache: Path | None = None, until: str | None = None) -> Spent:
-        """Run a config with an empty store.
-
-        cache: folder of caches, kernels included; None for the user's own. until: the last stage; None for all.
-        Raises RunFailedError.
-        """
-        with scratch.temporary() as folder:
-            command = [*self.words, "run", str(config), "--store", f"{folder}/store", "--out", f"{folder}/out"]
-            command += [] if until is None else ["--until", until]
-            environment = dict(os.environ)
-            if cache is not None:
-                environment["XDG_CACHE_HOME"] = str(cache)
-            with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
-                started = time.perf_counter()
-                process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment)
-                # unlike getrusage, of this child alone
-                _, status, usage = os.wait4(process.pid, 0)
-                seconds = time.perf_counter() - started
-                process.returncode = os.waitstatus_to_exitcode(status)
-                if process.returncode != 0:
-                    errors.seek(0)
-                    raise RunFailedError(errors.read().strip().rpartition("\n")[2])
-        return Spent(seconds, usage.ru_utime + usage.ru_stime)
+    words: those that start the tool, before the name of a command. cache: folder of caches, kernels included; None
+    for the user's own. until: the last stage; None for all. Raises RunFailedError.
+    """
+    environment = dict(os.environ) if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    with scratch.temporary() as folder:
+        command = [*words, "run", str(config), "--store", f"{folder}/store", "--out", f"{folder}/out"]
+        command += [] if until is None else ["--until", until]
+        before, started = getrusage(RUSAGE_CHILDREN), time.perf_counter()
+        ended = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment, text=True)
+        seconds, after = time.perf_counter() - started, getrusage(RUSAGE_CHILDREN)
+    if ended.returncode != 0:
+        raise RunFailedError(ended.stderr.strip().rpartition("\n")[2])
+    return Spent(seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
 def write_config(folder: Path, name: str, text: str) -> Path:
@@ -88,14 +75,14 @@ def write_config(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-def warm_run_s(command_line: CommandLine, config: Path, progress: Progress = silent) -> float:
+def warm_run_s(command_line: Sequence[str], config: Path, progress: Progress = silent) -> float:
     """Return the seconds of `run --until table` with an empty store and warm kernels, the fastest of five.
 
     One more run, the first, fills the kernel cache. Raises RunFailedError.
     """
     seconds = []
     for i in range(_WHOLE_RUNS):
-        seconds.append(command_line.run(config, until="table").seconds)
+        seconds.append(run(command_line, config, until="table").seconds)
         progress("whole runs", (i + 1) / _WHOLE_RUNS)
     return min(seconds[1:])
 
@@ -115,7 +102,7 @@ class Compiling:
     second_bake_s: float
 
 
-def measure_compiling(command_line: CommandLine, progress: Progress = silent) -> Compiling:
+def measure_compiling(command_line: Sequence[str], progress: Progress = silent) -> Compiling:
     """Measure compiling: processor time of a run with cold kernels less that with warm ones.
 
     Raises RunFailedError.
@@ -125,7 +112,7 @@ def measure_compiling(command_line: CommandLine, progress: Progress = silent) ->
         first, other = write_config(root, "first", _FIRST), write_config(root, "next", _NEXT)
 
         def cpu_s(path: Path) -> float:
-            spent = command_line.run(path, cache, until="table").cpu_s
+            spent = run(command_line, path, cache, until="table").cpu_s
             progress("compiling", next(done) / 8.0)
             return spent
 
@@ -144,7 +131,7 @@ def measure_compiling(command_line: CommandLine, progress: Progress = silent) ->
         warm_next = min(cpu_s(other), cpu_s(other))
         forget_kernels()
         bakes = [
-            command_line.run(write_config(root, name, text), cache).seconds
+            run(command_line, write_config(root, name, text), cache).seconds
             for name, text in (("elaphe", _FIRST_BAKE), ("xenopeltis", _SECOND_BAKE))
         ]
     return Compiling(cold - warm, max(cold_next - warm_next, 0.0), *bakes)

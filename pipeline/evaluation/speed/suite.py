@@ -114,19 +114,12 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """Difference of other algorithms from the kernels, of samples over max(sample, 1e-7 of the mirror)."""
-
-    nufft: RelativeError | None
-    numpy: RelativeError
-
-
-@dataclass(frozen=True)
 class SurfaceSpeed:
     """The measurements of a surface.
 
     samples: (ny, nx). terms, nodes, w_terms: of the polar table of layout MAIN, as are stages and second_light_s.
-    timed: work and seconds of stages and kernels. memory_bytes: the peak of a process that bakes that table. notes:
+    timed: work and seconds of stages and kernels. agreement: difference of "nufft" and "numpy" from the kernels, of
+    samples over max(sample, 1e-7 of the mirror). memory_bytes: the peak of a process that bakes that table. notes:
     omissions with their reasons. whole_run_s: a process from its start to the table, kernels warm; whole_run_fault:
     why it was not measured.
     """
@@ -143,7 +136,7 @@ class SurfaceSpeed:
     second_light_s: float | None
     timed: list[Timed]
     transforms: list[Transforms]
-    agreement: Agreement
+    agreement: dict[str, RelativeError | None]
     nufft_upsampling: float | None
     memory_bytes: int | None
     notes: list[str]
@@ -201,7 +194,7 @@ class _Suite:
             second_light_s=baked.second_light_s,
             timed=timed,
             transforms=measured,
-            agreement=Agreement(nufft_agrees, numpy_agrees),
+            agreement={"nufft": nufft_agrees, "numpy": numpy_agrees},
             nufft_upsampling=found.upsampling if found else None,
             memory_bytes=memory.peak_bytes(self._field, self._config, MAIN) if effort.memory else None,
             notes=self._notes,

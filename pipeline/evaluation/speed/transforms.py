@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from kernels.dft_stack import Kept
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.evaluation.plain_numpy import chebyshev_terms
@@ -42,37 +41,30 @@ def measure(setting: Setting, repeats: int) -> list[Transforms]:
 
 
 def _measure(setting: Setting, precision: Precision, repeats: int) -> Transforms:
-    real, bake, reach = _REAL[precision], setting.bake, float(setting.bake.radius_per_um[-1])
-    terms, t = setting.plan.terms, np.fft.ifftshift(setting.field.heights_um) * dft_stack.scale_per_um(setting.field)
+    real, terms, bake, field = _REAL[precision], setting.plan.terms, setting.bake, setting.field
+    window = bake.sigma_um, float(bake.radius_per_um[-1]), bake.tolerance
+    kept = dft_stack.size(field.extent, *window).kept
+    t = np.fft.ifftshift(field.heights_um) * dft_stack.scale_per_um(field)
 
     def by_kernel() -> Stack:
-        window = bake.sigma_um, reach, bake.tolerance
-        return dft_stack.build(setting.field, "chebyshev", terms, *window, dtype=real)
-
-    kept = kept_of(by_kernel())
-    shape = (*kept.shape, 2, terms)
+        return dft_stack.build(field, "chebyshev", terms, *window, dtype=real)
 
     def by_fftw() -> NDArray[Any]:
-        out = np.empty(shape, real)
+        out = np.empty((*kept.shape, 2, terms), real)
         transform(chebyshev_terms(t), kept, out)
         return out
 
     def by_scipy() -> NDArray[Any]:
-        out, places = np.empty(shape, real), KeptCoefficients(t.shape, kept)
+        out, places = np.empty((*kept.shape, 2, terms), real), KeptCoefficients(t.shape, kept)
         for n, term in zip(range(terms), chebyshev_terms(t), strict=False):
             places.put(fft.rfft2(term.astype(real), workers=os.cpu_count()), out[..., n])
         return out
 
-    # plans are measured, or read from wisdom, once
+    # kernels are compiled, and plans measured or read from wisdom, once
+    by_kernel()
     by_fftw()
     built, kernel_s = best_of(repeats, by_kernel)
     fftw, fftw_s = best_of(repeats, by_fftw)
     scipy, scipy_s = best_of(repeats, by_scipy)
     differences = (float(np.max(np.abs(other - built.coefficients))) for other in (fftw, scipy))
     return Transforms(precision, terms, kernel_s, fftw_s, scipy_s, *differences)
-
-
-def kept_of(built: Stack) -> Kept:
-    """Return the frequencies that a stack holds."""
-    columns = built.coefficients.shape[1]
-    return Kept(built.row_zero, columns - built.column_zero - 1, built.column_zero)
