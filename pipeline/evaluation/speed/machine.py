@@ -18,10 +18,6 @@ class Machine:
     double_flops: float
     bandwidth: float
 
-    def peak(self, precision: Precision) -> float:
-        """Return the FMA peak of a precision, operations a second."""
-        return self.single_flops if precision == "single" else self.double_flops
-
 
 def measure() -> Machine:
     """Measure peaks and bandwidth of the default device."""
@@ -71,7 +67,8 @@ class Share(Work):
 def share(timed: Timed, machine: Machine) -> Share:
     """Return the shares of the machine's limits that a stage reaches."""
     work, seconds = timed.work, timed.seconds
-    peak, bandwidth = work.flops / seconds / machine.peak(work.precision), work.bytes / seconds / machine.bandwidth
+    limit = machine.single_flops if work.precision == "single" else machine.double_flops
+    peak, bandwidth = work.flops / seconds / limit, work.bytes / seconds / machine.bandwidth
     bound: Literal["arithmetic", "bandwidth"] = "arithmetic" if peak >= bandwidth else "bandwidth"
     return Share(
         **vars(work),

@@ -46,17 +46,10 @@ class Paper:
         plan = expansion.plan_taylor(field, self._quadrature(STEP_NM), _TOLERANCE)
         reachable = expansion.W_MAX / (1e-3 * config.light.lambda_min_nm)
 
-        def build() -> dft_stack.Stack:
-            cut = dft_stack.window_tolerance(_TOLERANCE)
-            return dft_stack.build(field, "taylor", plan.order + 1, config.coherence.sigma_um, reachable, cut)
-
-        self._stack, self._stack_s = best_of(repeats, build)
+        of = plan.order + 1, config.coherence.sigma_um, reachable, dft_stack.window_tolerance(_TOLERANCE)
+        self._stack, self._stack_s = best_of(repeats, lambda: dft_stack.build(field, "taylor", *of))
         # compiles the kernel
         taylor.node_values(self._stack, self._quadrature(STEP_NM), np.zeros((1, 2)))
-
-    @property
-    def terms(self) -> int:
-        return self._stack.terms
 
     def table(self, resolution: int, step_nm: float) -> PaperTable:
         quadrature = self._quadrature(step_nm)
