@@ -12,8 +12,7 @@ from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures.maps import SHOWN_RU, STRICT_RU
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Page, PageText, Picture
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
-from pipeline.evaluation.methods.paper_look_up import PUBLISHED_POWER, PUBLISHED_RESOLUTION
-from pipeline.evaluation.methods.paper_reference import TOLERANCE, taylor_stack
+from pipeline.evaluation.methods.paper_shaders import PUBLISHED_POWER, PUBLISHED_RESOLUTION, TOLERANCE, taylor_stack
 from pipeline.evaluation.plots.charts import Chart, Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
 from pipeline.optics.colour import delta_e, displayed_srgb

@@ -14,7 +14,7 @@ from pipeline.evaluation.figures.bands import VISIBLE_CONTRAST, Bands
 from pipeline.evaluation.figures.laser_screen import DELTA_E, LIGHT, Colour, Screen, experiment, screen_bands
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageText, Picture
 from pipeline.evaluation.methods.catalogue import BUMPS, EXACT, METHODS, OURS, PAPER, STAM
-from pipeline.evaluation.methods.paper_look_up import PaperLookUp
+from pipeline.evaluation.methods.paper_shaders import PaperLookUp
 from pipeline.evaluation.methods.stam_gaussian import DiscWindow, StamGaussian
 from pipeline.evaluation.plots import screen_plots
 from pipeline.evaluation.plots.charts import Series, charts

@@ -15,7 +15,6 @@ The price of eq. 1.1: a term keeps 3e-8 of its extent, most of which is its valu
 mirror direction keep fewer digits than floats would. On *Elaphe*, 7e-6 of XYZ or of 1e-7 of a mirror's, in the mean.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, floor, pi
 
@@ -33,7 +32,6 @@ from pipeline.surface.heightfield import HeightField
 
 # of exp(i k w h) at the worst sample: the Taylor series' remainder where no number of terms is given
 SERIES_TOLERANCE = 1e-6
-_DIRECTIONS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -122,15 +120,8 @@ class Lookup:
         built = transform(field, terms, (kept_x + 1 + taps_x, kept_y + 1 + taps_y))
         self.terms = terms
         self.stored_bytes = built.normalised.nbytes + built.least.nbytes + built.span.nbytes
-        self._device = thesis_lookup.upload_terms(
-            built.normalised,
-            built.least,
-            built.span,
-            built.zero,
-            built.spacing_per_um,
-            (taps_x, taps_y),
-            sigma_f(sigma_um),
-        )
+        of = built.normalised, built.least, built.span, built.zero, built.spacing_per_um
+        self._device = thesis_lookup.upload_terms(*of, (taps_x, taps_y), sigma_f(sigma_um))
 
     def at_pairs(self, weight: thesis_lookup.Weight, uvw: Array, lambda_nm: Array) -> Array:
         """Return |P|^2 (pairs,) of `uvw` (pairs, 3) at `lambda_nm` (pairs,); NaN beyond the Nyquist limits.
@@ -151,18 +142,8 @@ class Lookup:
 
     def power(self, weight: thesis_lookup.Weight, uvw: Array, lambda_nm: Array) -> Array:
         """Return |P|^2 (directions, L) of every direction (directions, 3) at every wavelength (L,), as `at_pairs`."""
-        out = np.empty((len(uvw), len(lambda_nm)))
-        for tile in tiles(len(uvw)):
-            each, count = uvw[tile], len(lambda_nm)
-            pairs = self.at_pairs(weight, np.repeat(each, count, axis=0), np.tile(lambda_nm, len(each)))
-            out[tile] = pairs.reshape(len(each), count)
-        return out
-
-
-def tiles(count: int) -> Iterator[slice]:
-    """Directions few enough to be held with all their wavelengths."""
-    for first in range(0, count, _DIRECTIONS_AT_ONCE):
-        yield slice(first, min(first + _DIRECTIONS_AT_ONCE, count))
+        pairs = self.at_pairs(weight, np.repeat(uvw, len(lambda_nm), axis=0), np.tile(lambda_nm, len(uvw)))
+        return pairs.reshape(len(uvw), len(lambda_nm))
 
 
 def _taps(reach: Reach, size_um: float, sigma_um: float) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.errors import ConfigError
+from pipeline.evaluation.methods.method import Method
 from pipeline.optics.colour import SRGB_TO_XYZ
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.periods import dominant_periods
@@ -23,10 +24,12 @@ _WHITE = (1.0, 1.0, 1.0)
 DEFAULT_ROUGHNESS = 10.0
 
 
-class Gems:
+class Gems(Method):
     """sum_n rainbow(d T.H / n) + highlight exp(-(r d T.H / N.H)^2), H = wi + wr, not normalised."""
 
     source = "[G04] ch. 8"
+    # spacing, direction, roughness, exposure and the highlight's colour: nothing is tabulated
+    stored_bytes = 7 * np.dtype(float).itemsize
 
     def __init__(
         self,
@@ -57,13 +60,7 @@ class Gems:
         exposure = config.render.exposure_ru if shown_at_ru is None else shown_at_ru
         self._unit = config.radiometry.unit / exposure
 
-    @property
-    def stored_bytes(self) -> int:
-        """Spacing, direction, roughness, exposure and the highlight's colour: nothing is tabulated."""
-        return 7 * np.dtype(float).itemsize
-
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
         return np.asarray(self._unit * self.rgb(wi, wr) @ SRGB_TO_XYZ.T)
 
     def rgb(self, wi: Array, wr: Array) -> Array:

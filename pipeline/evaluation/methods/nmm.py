@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import integrate
 from pipeline.errors import ConfigError
-from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach, tiles
-from pipeline.optics.light import FINE_STEP_NM, trapezoid
+from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, Lookup, Reach
+from pipeline.evaluation.methods.method import Method, integrated, spread
+from pipeline.optics.light import FINE_STEP_NM
 from pipeline.surface.heightfield import HeightField
 
 
@@ -72,7 +72,7 @@ def _shares(direction: NDArray[np.int64], lambda_nm: Array, range_nm: tuple[floa
     return np.asarray(above - below)
 
 
-class Nmm:
+class Nmm(Method):
     """From n_min to n_max ([S14] 1.5.2), with a white centre."""
 
     source = "[S14] 1.5.2"
@@ -95,27 +95,15 @@ class Nmm:
             fault = "expected a spectrum: NMM selects wavelengths from a range, and a laser line has one"
             raise ConfigError(config.name, [("spectrum.illuminant", fault)])
         self._config, self._size_um = config, field.size_um
-        self._quadrature = trapezoid(config.light, FINE_STEP_NM)
         first_order = 1e-3 * config.light.range_nm[1] / min(field.size_um)
         self.white_radius = first_order if white_radius is None else white_radius
         self._lookup = Lookup(field, config, terms, reach)
-
-    @property
-    def stored_bytes(self) -> int:
-        return self._lookup.stored_bytes
+        self.stored_bytes = self._lookup.stored_bytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        out = np.empty((len(wr), 3))
-        for tile in tiles(len(wr)):
-            power = self._spread(-wi[tile] - wr[tile])
-            config = self._config
-            out[tile] = integrate(
-                power, self._quadrature, config.material, config.coherence.sigma_um, wi[tile], wr[tile]
-            )
-        return out
+        return integrated(self._spread, self._config, wi, wr, FINE_STEP_NM)
 
-    def _spread(self, uvw: Array) -> Array:
+    def _spread(self, uvw: Array, nodes_nm: Array) -> Array:
         """|P|^2 (directions, L) on the grid of the colour weights, holding the power at the selected wavelengths.
 
         [S14] interpolates colour weights linearly between whole nanometres; spreading a value over both with the same
@@ -124,15 +112,6 @@ class Nmm:
         chosen = landing(uvw[:, :2], self._size_um, self._config.light.range_nm)
         # wavelengths beyond the Nyquist limits add nothing
         power = np.nan_to_num(self._lookup.at_pairs("gaussian", uvw[chosen.direction], chosen.lambda_nm))
-        nodes = self._quadrature.lambda_nm
-        cell_nm = np.gradient(nodes)
-        cell_nm[[0, -1]] *= 0.5
-        position = np.interp(chosen.lambda_nm, nodes, np.arange(len(nodes)))
-        below = np.minimum(position.astype(np.int64), len(nodes) - 2)
-        grid = np.zeros(len(uvw) * len(nodes))
-        for node, part in ((below, below + 1 - position), (below + 1, position - below)):
-            weights = part * power * chosen.share_nm / cell_nm[node]
-            grid += np.bincount(chosen.direction * len(nodes) + node, weights, minlength=len(grid))
-        spread = grid.reshape(len(uvw), len(nodes))
-        spread[np.hypot(uvw[:, 0], uvw[:, 1]) < self.white_radius] = 1.0
-        return spread
+        light = spread(chosen.direction, chosen.lambda_nm, power * chosen.share_nm, nodes_nm, len(uvw))
+        light[np.hypot(uvw[:, 0], uvw[:, 1]) < self.white_radius] = 1.0
+        return light

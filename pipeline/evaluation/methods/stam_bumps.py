@@ -17,7 +17,6 @@ are found once, for the other delta picks no wavelength. The specular order is m
 
 from dataclasses import dataclass
 from math import floor, pi, sqrt
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,30 +24,25 @@ from scipy import fft
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import STEP_NM, integrate
+from pipeline.diffraction.reference import STEP_NM
 from pipeline.errors import ConfigError
+from pipeline.evaluation.methods.method import Monochromatic, integrated, spread
 from pipeline.optics.coherence import sigma_f
-from pipeline.optics.light import trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.periods import dominant_periods
 
 PUBLISHED_EPSILON = 0.01  # [D14] sec. 6.3, fig. 11(a)
 PUBLISHED_SHARE = 0.5  # [D14] fig. 11: bumps are half as wide and as high as their period
-_AT_ONCE = 2048
 _NO_WAVELENGTH_UM = 1e-6
-
-
-class Bump(Protocol):
-    """The shape of one bump, in shares of its cell."""
-
-    def coefficients(self, n: Array, m: Array, s_per_um: Array) -> NDArray[np.complex128]:
-        """c_nm = 1/(dx dy) integral over one cell of exp(i s b(x, y)) exp(2 pi i (n x / dx + m y / dy)), s = k w."""
-        ...
 
 
 @dataclass(frozen=True)
 class RectangularBump:
-    """`height_um` over the shares of both periods, else 0."""
+    """`height_um` over the shares of both periods, else 0.
+
+    `coefficients` of either bump are c_nm (...), the integral over one cell, divided by dx dy, of
+    exp(i s b(x, y)) exp(2 pi i (n x / dx + m y / dy)) with s = k w.
+    """
 
     height_um: float
     share_x: float = PUBLISHED_SHARE
@@ -74,6 +68,9 @@ class TriangularBump:
         slopes = [0.5 * np.exp(0.5j * (z + t)) * np.sinc((z - t) / (2.0 * pi)) for t in (turn, -turn)]
         profile = self.share_x * (sum(slopes) - np.sinc(self.share_x * n))
         return np.asarray(_flat(n, m) + profile * self.share_y * np.sinc(self.share_y * m))
+
+
+Bump = RectangularBump | TriangularBump
 
 
 def _flat(n: Array, m: Array) -> Array:
@@ -109,10 +106,12 @@ def matched_epsilon(sigma_um: float, periods_um: tuple[float, float]) -> float:
     return 0.5 * sqrt(pi * periods_um[0] * periods_um[1]) * sigma_f(sigma_um)
 
 
-class StamBumps:
+class StamBumps(Monochromatic):
     """The colour of a regular lattice of one bump, whatever else the surface may be."""
 
     source = "[S99] eq. 21-24, [D14] eq. 14, 15"
+    # two periods, height, two shares and epsilon: nothing is tabulated
+    stored_bytes = 6 * np.dtype(float).itemsize
 
     def __init__(
         self,
@@ -128,31 +127,19 @@ class StamBumps:
         """
         if not 0.0 < epsilon <= 0.5:
             raise ConfigError(config.name, [("epsilon", f"expected 0 < epsilon <= 0.5, got {epsilon:g}")])
-        self._config, self._lambda_min_nm = config, config.light.lambda_min_nm
+        super().__init__(config)
         if periods_um is None:
             if field.half_range_um == 0.0:
                 raise ConfigError(config.name, [("periods_um", "a flat surface has no period: give them")])
-            periods_um = estimated_periods(field, 2e3 / self._lambda_min_nm)
+            periods_um = estimated_periods(field, 2e3 / config.light.lambda_min_nm)
         self.periods_um = periods_um
         self.bump = RectangularBump(PUBLISHED_SHARE * periods_um[0]) if bump is None else bump
         self.epsilon = epsilon
 
-    @property
-    def stored_bytes(self) -> int:
-        """Two periods, height, two shares and epsilon: nothing is tabulated."""
-        return 6 * np.dtype(float).itemsize
-
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        config, quadrature = self._config, trapezoid(self._config.light, STEP_NM)
         # of a laser there are no wavelengths to pick from
-        power = self.power if len(quadrature.lambda_nm) == 1 else self._picked
-        out = np.empty((len(wr), 3))
-        for first in range(0, len(wr), _AT_ONCE):
-            part = np.s_[first : first + _AT_ONCE]
-            found = power(-wi[part] - wr[part], quadrature.lambda_nm)
-            out[part] = integrate(found, quadrature, config.material, config.coherence.sigma_um, wi[part], wr[part])
-        return out
+        power = self.power if self._config.light.is_line else self._picked
+        return integrated(power, self._config, wi, wr, STEP_NM)
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
         """|c_nm|^2 (directions, L) where both axes are within epsilon of an order, else 0: no band bounds a model."""
@@ -176,12 +163,10 @@ class StamBumps:
             specular &= np.abs(np.multiply.outer(uvw[:, axis], period * per_um)) <= self.epsilon
         none = np.zeros(1)
         total = np.where(specular, self._efficiency(none, none, np.multiply.outer(uvw[:, 2], per_um)), 0.0)
-        for axis in (0, 1):
-            self._add_lines(total, uvw, lambda_nm, axis)
-        return total
+        return total + self._lines(uvw, lambda_nm, 0) + self._lines(uvw, lambda_nm, 1)
 
-    def _add_lines(self, total: Array, uvw: Array, lambda_nm: Array, axis: int) -> None:
-        """Adds the light of every wavelength that the delta function along an axis picks."""
+    def _lines(self, uvw: Array, lambda_nm: Array, axis: int) -> Array:
+        """The light of every wavelength that the delta function along an axis picks."""
         along, across = self.periods_um[axis], self.periods_um[1 - axis]
         n = np.arange(1, floor(along * 2e3 / lambda_nm[0]) + 1)
         picked_um = np.abs(uvw[:, axis, None]) * along / n
@@ -194,15 +179,4 @@ class StamBumps:
         light = self._efficiency(orders[0], orders[1], uvw[row, 2] / um)
         # an order that both delta functions find counts half each time
         width_nm = 2e3 * self.epsilon * um / n[which] * np.where(second == 0.0, 1.0, 0.5)
-        _deposit(total, row, 1e3 * um, light * width_nm, lambda_nm)
-
-
-def _deposit(total: Array, row: NDArray[np.intp], at_nm: Array, light: Array, lambda_nm: Array) -> None:
-    """Shares `light`, |P|^2 times nm, between the two nodes about each wavelength; the rule's sum returns it."""
-    step = lambda_nm[1] - lambda_nm[0]
-    place = (at_nm - lambda_nm[0]) / step
-    left = np.minimum(place.astype(int), len(lambda_nm) - 2)
-    for node, share in ((left, 1.0 - (place - left)), (left + 1, place - left)):
-        # the trapezoidal rule counts its ends half
-        rule = np.where((node == 0) | (node == len(lambda_nm) - 1), 0.5, 1.0)
-        np.add.at(total, (row, node), light * share / (rule * step))
+        return spread(row, 1e3 * um, light * width_nm, lambda_nm, len(uvw))

@@ -14,10 +14,8 @@ exp(-g) g^n / n! FT{C^n}. Chebyshev polynomials need fewer, and their factors st
 exp(-z (1 - t)) = sum_n (2 - [n = 0]) exp(-z) I_n(z) T_n(t), t = (C - middle) / H, z = g H, |t| <= 1.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import floor, log, pi, sqrt
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +26,8 @@ from scipy.special import ive, j1
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import expansion
-from pipeline.evaluation.methods.method import integrated
+from pipeline.evaluation.methods.method import Monochromatic
+from pipeline.evaluation.plain_numpy import chebyshev_terms
 from pipeline.optics.coherence import sigma_f
 from pipeline.surface.heightfield import HeightField
 
@@ -42,27 +41,13 @@ _GAUSSIAN_CUT, _DISC_CUT = 1e-9, 1e-4
 _PAIRS_AT_ONCE = 50_000
 
 
-class Window(Protocol):
-    """The window over which light is coherent.
-
-    sigma_um: of the Gaussian window with the same effective area, 4 pi sigma^2 = (integral of g)^2 / integral of g^2.
-    reach_per_um: how far from its peak the |transform|^2 is followed.
-    """
-
-    @property
-    def sigma_um(self) -> float: ...
-
-    @property
-    def reach_per_um(self) -> float: ...
-
-    def power(self, f_per_um: Array) -> Array:
-        """|transform|^2 at distances from its peak, 1 there."""
-        ...
-
-
 @dataclass(frozen=True)
 class GaussianWindow:
-    """exp(-r^2 / (2 sigma^2)), the coherence window of every other method."""
+    """exp(-r^2 / (2 sigma^2)), the coherence window of every other method.
+
+    Windows have `reach_per_um`, how far from its peak their |transform|^2 is followed, and `power`, which gives that
+    at distances from its peak, 1 there.
+    """
 
     sigma_um: float
 
@@ -77,7 +62,10 @@ class GaussianWindow:
 
 @dataclass(frozen=True)
 class DiscWindow:
-    """A circular aperture, [D14] sec. 6.3: Airy's pattern."""
+    """A circular aperture, [D14] sec. 6.3: Airy's pattern.
+
+    sigma_um: of the Gaussian window with the same effective area, 4 pi sigma^2 = (integral of g)^2 / integral of g^2.
+    """
 
     radius_um: float = PUBLISHED_DISC_RADIUS_UM
 
@@ -94,6 +82,9 @@ class DiscWindow:
         """(2 J_1(x) / x)^2, x = 2 pi radius f."""
         x = np.maximum(2.0 * pi * self.radius_um * np.abs(f_per_um), 1e-9)
         return np.asarray((2.0 * j1(x) / x) ** 2)
+
+
+Window = GaussianWindow | DiscWindow
 
 
 def autocovariance(field: HeightField) -> Array:
@@ -162,7 +153,7 @@ class GaussianSurface:
         ny, nx = t.shape
         wrapped = np.ix_(self._grid.rows % ny, self._grid.columns % nx)
         spectra = np.empty((len(self._grid.rows), len(self._grid.columns), terms))
-        for n, term in enumerate(_chebyshev(t, terms)):
+        for n, term in zip(range(terms), chebyshev_terms(t), strict=False):
             # C is real and even, and so is its transform
             spectra[..., n] = fft.fft2(term, workers=-1).real[wrapped] / t.size
         specular = spectra[self._grid.zero].copy()
@@ -204,31 +195,22 @@ class GaussianSurface:
         return np.asarray(gather @ self._diffuse + specular)
 
 
-class StamGaussian:
+class StamGaussian(Monochromatic):
     """Stam's expectation with the autocorrelation that the scan itself has, as [D14] sec. 6.3 uses it."""
 
     source = "[S99] eq. 12, [D14] sec. 6.3"
 
     def __init__(self, field: HeightField, config: Config, window: Window | None = None) -> None:
         """The coherence window of the config unless another is given, such as the text's `DiscWindow()`."""
-        self._window = GaussianWindow(config.coherence.sigma_um) if window is None else window
-        lambda_min = config.light.lambda_min_nm
-        self._surface = GaussianSurface(autocovariance(field), field.pitch_um, self._window, lambda_min)
+        window = window or GaussianWindow(config.coherence.sigma_um)
         # `absolute` multiplies by the window's area
-        coherence = config.coherence.model_copy(update={"sigma_um": self._window.sigma_um})
-        self._config = config.model_copy(update={"coherence": coherence})
-
-    @property
-    def stored_bytes(self) -> int:
-        """Of the spectra of all polynomials in C."""
-        return self._surface.stored_bytes
-
-    def xyz(self, wi: Array, wr: Array) -> Array:
-        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        return integrated(self.power, self._config, wi, wr)
+        coherence = config.coherence.model_copy(update={"sigma_um": window.sigma_um})
+        super().__init__(config.model_copy(update={"coherence": coherence}))
+        lambda_min = config.light.lambda_min_nm
+        self._surface = GaussianSurface(autocovariance(field), field.pitch_um, window, lambda_min)
+        self.stored_bytes = self._surface.stored_bytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """Return E|P|^2 (directions, L); NaN beyond the Nyquist limits."""
         return self._surface.power(uvw, lambda_nm)
 
 
@@ -238,11 +220,3 @@ def _terms_for(z: float) -> int:
     orders = np.arange(int(8.0 * sqrt(z)) + 40)
     tail: Array = 2.0 * np.cumsum(ive(orders, z)[::-1])[::-1]
     return max(1, int(np.searchsorted(-tail, -_TOLERANCE)))
-
-
-def _chebyshev(t: Array, terms: int) -> Iterator[Array]:
-    """T_0(t), T_1(t), ... by recurrence; each holds until the next is asked for."""
-    before, term = t, np.ones_like(t)
-    for _ in range(terms):
-        yield term
-        before, term = term, 2.0 * t * term - before

@@ -8,8 +8,7 @@ from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import energy
 from pipeline.evaluation.figures.order_efficiencies import LAMBDA_MIN_NM, known_gratings
 from pipeline.evaluation.figures.page import Bench, BenchSurface
-from pipeline.evaluation.methods.exact import Exact
-from pipeline.evaluation.methods.polar_table import PolarTableMethod
+from pipeline.evaluation.methods.own_methods import Exact, PolarTableMethod
 from pipeline.optics.material import Material
 from pipeline.progress import silent
 from pipeline.surface import recipes

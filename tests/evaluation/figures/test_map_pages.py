@@ -13,7 +13,7 @@ from pipeline.evaluation.figures.maps import NORMAL, blazed_recipe, directions, 
 from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.figures.truncated_series import ChebyshevSeries, TaylorSeries
 from pipeline.evaluation.methods.catalogue import METHODS
-from pipeline.evaluation.methods.paper_look_up import PaperLookUp
+from pipeline.evaluation.methods.paper_shaders import PaperLookUp
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window
 from pipeline.optics.light import trapezoid

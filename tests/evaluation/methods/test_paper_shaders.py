@@ -8,8 +8,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.methods.method import Monochromatic
-from pipeline.evaluation.methods.paper_look_up import PaperLookUp
-from pipeline.evaluation.methods.paper_reference import PaperReference
+from pipeline.evaluation.methods.paper_shaders import PaperLookUp, PaperReference
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence, sigma_f
 from pipeline.optics.light import Light

@@ -5,9 +5,8 @@ import pytest
 from scipy.special import jv
 
 from pipeline.evaluation.methods.dft_terms import Coefficients
-from pipeline.evaluation.methods.flss import Flss
+from pipeline.evaluation.methods.flss import Flss, Pq
 from pipeline.evaluation.methods.method import Monochromatic
-from pipeline.evaluation.methods.pq import Pq
 from pipeline.optics import geometry
 from pipeline.optics.colour import delta_e
 from pipeline.surface.heightfield import HeightField

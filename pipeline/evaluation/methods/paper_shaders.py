@@ -1,4 +1,4 @@
-"""The reference shader of [D14] sec. 5: Taylor terms, their windowed DFT, a trapezoidal rule of 5 nm, on the fly."""
+"""The shaders of [D14] sec. 5: the reference shader, which sums on the fly, and the look-up shader of tables."""
 
 from math import exp
 
@@ -9,47 +9,36 @@ from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.reference import in_band
-from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, integrated
+from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, Method, Monochromatic
 from pipeline.optics.light import Quadrature, trapezoid
 from pipeline.surface.heightfield import HeightField
+from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor import table as taylor
 
 # [D14] sec. 5: the window's transform is summed over 4 sigma_f either side, where it has fallen to 3e-4
 PUBLISHED_CUT = exp(-(4.0**2) / 2.0)
+# [D14] sec. 5: "up to 501 x 501" nodes 2 |t|^5 sign(t)
+PUBLISHED_RESOLUTION, PUBLISHED_POWER = 501, 5.0
 # of |P|^2: it gives heights like the paper's some of its 15 to 40 terms
 TOLERANCE = 1e-3
 
 
-class PaperReference:
+class PaperReference(Monochromatic):
     """sum_n (i k w)^n / n! F_n(u / lambda, v / lambda), F_n gathered for every direction and wavelength.
 
     With as many terms as its tolerance asks for, it differs from the exact reference by the window's cut at 4 sigma_f
-    and the wavelength step.
+    and the wavelength step. `terms` is N + 1: the paper has 15 to 40.
     """
 
     source = "[D14] sec. 5, reference shader"
 
     def __init__(self, field: HeightField, config: Config, tolerance: float = TOLERANCE) -> None:
         """Raises AccuracyError where heights are beyond Taylor terms in the shaders' single precision."""
-        self._field, self._config = field, config
-        self._stack = taylor_stack(field, config, tolerance)
-
-    @property
-    def terms(self) -> int:
-        """N + 1: the paper has 15 to 40."""
-        return self._stack.terms
-
-    @property
-    def stored_bytes(self) -> int:
-        """Of the DFT of every Taylor term."""
-        return self._stack.coefficients.nbytes
-
-    def xyz(self, wi: Array, wr: Array) -> Array:
-        """Return XYZ (directions, 3) under 1 RU; `wi` and `wr` are (directions, 3) each."""
-        return integrated(self.power, self._config, wi, wr)
+        super().__init__(config)
+        self._field, self._stack = field, taylor_stack(field, config, tolerance)
+        self.terms, self.stored_bytes = self._stack.terms, self._stack.coefficients.nbytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """Return |P|^2 (directions, L); NaN beyond the Nyquist limits."""
         out = np.empty((len(uvw), len(lambda_nm)))
         for first in range(0, len(lambda_nm), 3):
             three = lambda_nm[first : first + 3]
@@ -57,6 +46,29 @@ class PaperReference:
             single = Quadrature(three, np.eye(len(three), 3))
             out[:, first : first + 3] = taylor.at_directions(self._stack, single, uvw)[:, : len(three)]
         return np.where(in_band(self._field, uvw, 1e-3 * lambda_nm), out, np.nan)
+
+
+class PaperLookUp(Method):
+    """sum_p w^p I_p(u, v) ([D14] eq. 10) from float32 tables, bilinear. They know no single wavelength."""
+
+    source = "[D14] sec. 5, look-up shader"
+
+    def __init__(
+        self,
+        field: HeightField,
+        config: Config,
+        resolution: int = PUBLISHED_RESOLUTION,
+        power: float = PUBLISHED_POWER,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        """Raises AccuracyError where float32 tables would lose their digits, or not fit."""
+        rule = config.radiometry.integrand(PUBLISHED_STEP_NM)
+        table = taylor.build(taylor_stack(field, config, tolerance), rule, resolution, power)
+        self.stored_bytes = table.values.nbytes
+        self._look_up = table_evaluator(table, config.radiometry)
+
+    def xyz(self, wi: Array, wr: Array) -> Array:
+        return self._look_up(wi, wr)
 
 
 def taylor_stack(field: HeightField, config: Config, tolerance: float) -> Stack:
