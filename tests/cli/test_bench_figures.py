@@ -10,7 +10,7 @@ import pytest
 from pipeline.accuracy.plots import png
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures import pages
+from pipeline.evaluation.figures import bench
 from pipeline.evaluation.figures.page import Bench, Column, Page, PageTable, Picture
 from tests.cli.tool import REPOSITORY, Tool, recipe, too_wide
 
@@ -54,12 +54,12 @@ def tool(tool: Tool, published: Path) -> Tool:
 
 @pytest.fixture
 def one_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pages, "PAGES", ("first",))
+    monkeypatch.setattr(bench, "PAGES", ("first",))
 
     class Module:
         make = staticmethod(first)
 
-    monkeypatch.setattr(pages, "import_module", lambda _name: Module)
+    monkeypatch.setattr(bench, "import_module", lambda _name: Module)
 
 
 @pytest.mark.usefixtures("one_page")
@@ -141,11 +141,11 @@ def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypat
         make = staticmethod(refuse)
 
     modules = {
-        "pipeline.evaluation.figures.first": pages.import_module("first"),
+        "pipeline.evaluation.figures.first": bench.import_module("first"),
         "pipeline.evaluation.figures.tall_one": Refusing,
     }
-    monkeypatch.setattr(pages, "PAGES", ("tall_one", "first"))
-    monkeypatch.setattr(pages, "import_module", modules.__getitem__)
+    monkeypatch.setattr(bench, "PAGES", ("tall_one", "first"))
+    monkeypatch.setattr(bench, "import_module", modules.__getitem__)
     result = tool("bench", "figures")
     assert result.code == 0, result.stderr
     assert "tall_one: page of these surfaces (too tall): expected ≥ 1, measured 0" in result.stdout
@@ -155,4 +155,4 @@ def test_a_page_that_cannot_be_made_takes_no_other_with_it(tool: Tool, monkeypat
 def test_every_page_is_there() -> None:
     folder = REPOSITORY / "pipeline" / "evaluation" / "figures"
     with_make = {path.stem for path in folder.glob("*.py") if "\ndef make(" in path.read_text(encoding="utf-8")}
-    assert with_make == set(pages.PAGES)
+    assert with_make == set(bench.PAGES)

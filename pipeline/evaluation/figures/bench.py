@@ -1,20 +1,48 @@
-"""`bench figures`: the surfaces of the validation bench, its pages, and the files that hold them."""
+"""`bench figures`: the surfaces of the validation bench, its pages in order, and the files that hold them."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from typing import Any
 
 from pipeline.config.models import Config
-from pipeline.errors import ConfigError, InputError
+from pipeline.errors import BakeError, ConfigError, InputError
 from pipeline.evaluation import results
-from pipeline.evaluation.figures import html, pages
-from pipeline.evaluation.figures.page import Bench, BenchSurface
-from pipeline.evaluation.figures.pages import Made
-from pipeline.evaluation.sources import as_published
+from pipeline.evaluation.check import Check
+from pipeline.evaluation.figures.page import Bench, BenchSurface, Page
+from pipeline.evaluation.sources import SOURCES, as_published
+from pipeline.evaluation.speed.timing import timed
 from pipeline.progress import Progress
+from pipeline.report import template
+from pipeline.stages import provenance, surface
 from pipeline.stages import run as stages
-from pipeline.stages import surface
 from pipeline.store.store import Store
+
+# modules of this package, each with a `make`; imported when their turn comes
+PAGES = (
+    "viewing_angles",
+    "screen",
+    "brdf_maps",
+    "grids",
+    "terms",
+    "coherence_length",
+    "wavelength_step",
+    "methods_sheet",
+    "order_efficiencies",
+    "energy",
+    "validity",
+    "costs",
+)
+
+
+@dataclass(frozen=True)
+class Made:
+    """A page and the seconds it took."""
+
+    page: Page
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -25,13 +53,30 @@ class FigureResults:
 
     def document(self) -> dict[str, Any]:
         """Return all that was measured, for JSON."""
-        return pages.document(self.made)
+        return {
+            "versions": provenance.versions(),
+            "device": provenance.device(),
+            "pages": [{**each.page.document(), "seconds": each.seconds} for each in self.made],
+        }
 
     def files(self) -> dict[str, str | bytes]:
-        """Return index.html, a page for each figure and figures.json by name."""
+        """Return index.html with every verdict, a page for each figure and figures.json by name."""
+        verdicts = Counter(check.verdict for each in self.made for check in each.page.checks)
+        subtitle = (
+            f"{verdicts['holds']} of {verdicts['holds'] + verdicts['misses']} judged statements hold, "
+            f"{verdicts['reported']} more are reported and not judged. "
+            f"{sum(each.seconds for each in self.made):.0f} s in all."
+        )
+        index = {"title": "Validation bench", "subtitle": subtitle, "pages": self.made, "sources": SOURCES}
+        pages = [each.page for each in self.made]
         return {
-            "index.html": html.index(self.made),
-            **{f"{each.page.name}.html": html.page(each.page) for each in self.made},
+            "index.html": template.html(__package__, "index.html.in", **index),
+            **{
+                f"{page.name}.html": template.html(
+                    __package__, "figure.html.in", title=page.title, subtitle=page.source, page=page
+                )
+                for page in pages
+            },
             "figures.json": results.json_text(self.document()),
         }
 
@@ -43,15 +88,28 @@ def run(
     progress: Progress,
     note: Callable[[str], None],
 ) -> FigureResults:
-    """Make every page.
+    """Make every page, one after the other.
 
     configs: those of "elaphe" and "xenopeltis" that replace the synthetic surfaces, each with its file's name. quick:
-    smaller maps and fewer points. note: called with each surface and page. Raises ConfigError for two surfaces of one
-    name, which no page could tell apart, and for a laser line; InputError for a flat surface.
+    smaller maps and fewer points. note: called with a line about each surface and page. Raises ConfigError for two
+    surfaces of one name, which no page could tell apart, and for a laser line; InputError for a flat surface.
     """
-    chosen = _configs(configs)
-    surfaces = {role: _surface(role, config, store, progress, note) for role, config in chosen.items()}
-    return FigureResults(list(pages.make_all(Bench(**surfaces, quick=quick), progress, note)))
+    surfaces = {role: _surface(role, config, store, progress, note) for role, config in _configs(configs).items()}
+    bench, made = Bench(**surfaces, quick=quick), []
+    for name in PAGES:
+        made.append(Made(*timed(partial(_page, name, bench, progress))))
+        note(f"  {name:<20} {made[-1].seconds:5.1f} s")
+    return FigureResults(made)
+
+
+def _page(name: str, bench: Bench, progress: Progress) -> Page:
+    """A page that these surfaces do not allow states the reason, and the other pages are made."""
+    try:
+        page: Page = import_module(f"{__package__}.{name}").make(bench, progress)
+    except BakeError as error:
+        check = Check("made", f"page of these surfaces ({' '.join(str(error).split())})", 0, ">=", 1)
+        page = Page(name, f"{name.replace('_', ' ').capitalize()}: not made", "", "", [check])
+    return page
 
 
 def _configs(given: Mapping[str, tuple[Config, str]]) -> dict[str, Config]:
