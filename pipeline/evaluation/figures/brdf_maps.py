@@ -8,8 +8,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import map_physics, maps
-from pipeline.evaluation.figures.maps import NORMAL, SHOWN_RU, STRICT_RU, XENOPELTIS_RHO, Light
-from pipeline.evaluation.figures.method_runs import on_elaphe
+from pipeline.evaluation.figures.maps import NORMAL, SHOWN_RU, STRICT_RU, XENOPELTIS_RHO, Light, on_elaphe
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageText, Picture
 from pipeline.evaluation.methods.catalogue import METHODS, OURS, PAPER
 from pipeline.evaluation.plots.map_plots import Panel

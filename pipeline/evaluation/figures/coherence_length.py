@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
-from pipeline.evaluation.figures import maps, planes
+from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Page, PageText, Picture
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.plots.charts import Series, charts
@@ -88,7 +88,7 @@ def _map_step_nm(sigma_um: float) -> float:
 def _line_width(exact: Reference, period_um: float, expected_per_um: float) -> float:
     """Standard deviation in f, 1/um, of |P|^2 about the blazed first order at 550 nm."""
     f = 1.0 / period_um + np.linspace(-1.0, 1.0, _LINE_SAMPLES) * _LINE_WIDTHS * expected_per_um
-    uvw = geometry.uvw(*planes.under_normal_light(-1e-3 * _LINE_NM * f))
+    uvw = geometry.uvw(*maps.under_normal_light(-1e-3 * _LINE_NM * f))
     power = exact.power(uvw, np.array([_LINE_NM]))[:, 0]
     middle = np.average(f, weights=power)
     return float(np.sqrt(np.average((f - middle) ** 2, weights=power)))
@@ -99,7 +99,7 @@ def _purity(exact: Reference, config: Config, period_um: float) -> float:
     import colour
 
     u = 1e-3 * np.linspace(*_FIRST_ORDER_NM, _AXIS_SAMPLES) / period_um
-    xyz = exact.xyz(config.light, config.material, *planes.under_normal_light(-u))
+    xyz = exact.xyz(config.light, config.material, *maps.under_normal_light(-u))
     white = colour.XYZ_to_xy(trapezoid(config.light, STEP_NM).weights.sum(axis=0))
     return float(np.mean(colour.excitation_purity(colour.XYZ_to_xy(xyz), white)))
 

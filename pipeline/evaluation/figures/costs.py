@@ -1,8 +1,7 @@
 """Run time and error of all methods in one plot, on Elaphe."""
 
 from pipeline.evaluation.figures import maps
-from pipeline.evaluation.figures.maps import SHOWN_RU, STRICT_RU
-from pipeline.evaluation.figures.method_runs import Run, on_elaphe
+from pipeline.evaluation.figures.maps import SHOWN_RU, STRICT_RU, Run, on_elaphe
 from pipeline.evaluation.figures.page import Bench, Cell, Page, PageText
 from pipeline.evaluation.methods.catalogue import EXACT, METHODS, OURS, PAPER
 from pipeline.evaluation.plots import map_plots

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures import planes
+from pipeline.evaluation.figures.maps import cosine_views
 from pipeline.evaluation.figures.order_efficiencies import LAMBDA_MIN_NM, PERIOD_UM, KnownGrating, known_gratings
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageTable, PageText, numbers
 from pipeline.evaluation.methods.catalogue import EXACT, METHODS, OURS
@@ -69,7 +69,7 @@ def albedo(reference: Reference, sigma_um: float, theta: float, reach: float | N
     if reach is not None:
         x = x - wi[0]
     seen = x**2 + y**2 < 1.0
-    wr = planes.views(x[seen], y[seen])
+    wr = cosine_views(x[seen], y[seen])
     radiance = reference.xyz(_LINE, LOSSLESS, np.broadcast_to(wi, wr.shape), wr)[:, 1]
     return float(np.sum(radiance) / wi[2] * step**2)
 

@@ -13,9 +13,9 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.figures import peaks
+from pipeline.evaluation.figures.maps import window_on_sample_zero
 from pipeline.evaluation.figures.page import BenchSurface
 from pipeline.evaluation.figures.peaks import Band, Plane, Power
-from pipeline.evaluation.figures.planes import window_on_sample_zero
 from pipeline.evaluation.methods.catalogue import FLSS, METHODS, NMM, PQ
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.optics.gratings import period_um, viewing_angle

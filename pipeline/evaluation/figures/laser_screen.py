@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config.models import Accuracy, Config
-from pipeline.evaluation.figures.bands import Bands, bands_of
+from pipeline.evaluation.figures.maps import Bands, bands_of
 from pipeline.optics import geometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.light import Light

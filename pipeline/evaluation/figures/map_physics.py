@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import STEP_NM, Reference
-from pipeline.evaluation.figures import planes
-from pipeline.evaluation.figures.maps import Light, directions
+from pipeline.evaluation.figures.maps import Light, directions, under_normal_light
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.light import trapezoid
@@ -71,7 +70,7 @@ def blazed_luminance(config: Config, recipe: Blazed, wr: Array) -> Array:
 
     c_m = sinc(m + w h / lambda), each order seen through the window's transform.
     """
-    wi = planes.normal_light(wr)
+    wi = np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape)
     rule, uvw = trapezoid(config.light, STEP_NM), geometry.uvw(wi, wr)
     lambda_um, width = 1e-3 * rule.lambda_nm, sigma_f(config.coherence.sigma_um)
     power = np.zeros((len(wr), len(lambda_um)))
@@ -92,6 +91,6 @@ def order_sines(
     lambda_um = 1e-3 * lambda_nm
     expected = lambda_um / period_um * np.array(orders)
     offsets = np.linspace(-1.0, 1.0, _PEAK_SAMPLES) * _PEAK_WIDTHS * sigma_f(sigma_um) * lambda_um
-    wi, wr = planes.under_normal_light(0.0, (expected[:, None] + offsets).ravel())
+    wi, wr = under_normal_light(0.0, (expected[:, None] + offsets).ravel())
     power = exact.power(geometry.uvw(wi, wr), np.array([lambda_nm])).reshape(len(orders), -1)
     return expected, np.asarray(expected + offsets[np.argmax(power, axis=1)])

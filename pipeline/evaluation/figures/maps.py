@@ -1,18 +1,24 @@
-"""Exact BRDF maps of the bench's surfaces, and the errors of other maps against them."""
+"""Views of the bench, BRDF maps of its surfaces by every method, their errors, and their horizontal bands."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pipeline.accuracy.checks import MAP_RADIUS
 from pipeline.arrays import Array
 from pipeline.evaluation.figures.page import Bench, BenchSurface
+from pipeline.evaluation.methods.catalogue import METHODS
+from pipeline.evaluation.methods.method import Method
 from pipeline.evaluation.plots import map_plots
 from pipeline.evaluation.plots.map_plots import Panel
+from pipeline.evaluation.speed.timing import timed
 from pipeline.optics import geometry
 from pipeline.optics.colour import delta_e, displayed_srgb, pixels
 from pipeline.progress import Progress
+from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Blazed
 from pipeline.tables.evaluate import Map
 
@@ -23,7 +29,13 @@ ERROR_COLUMNS = tuple(f"mean ΔE, {ru:g} RU" for ru in EXPOSURES_RU)
 NOTICEABLE = 1.0
 # |(u, v)| of Xenopeltis' first order along its fingers, 1.5 um apart, in visible light
 XENOPELTIS_RHO = (0.25, 0.5)
+# a step of luminance that is barely seen (Weber's fraction): a band of less contrast counts as none
+VISIBLE_CONTRAST = 0.02
+# of the brightest row: a darker one counts as that dark, for beyond the scan's Nyquist limit all is dark
+_DARK_SHARE = 1e-9
 _SIZE, _QUICK_SIZE = 201, 61
+# enough to compile what a method runs on the device
+_WARM_UP = Map(11, MAP_RADIUS)
 # one of 255 steps of a channel, linear: below it a pixel is black
 _LIT = (1.0 / 255.0) ** 2.2
 # (theta, phi) in degrees
@@ -77,3 +89,84 @@ def panel(views: Map, xyz_ru: Array, title: str, note: str = "") -> Panel:
 def sheet(rows: Sequence[Sequence[Panel]], heading: str, row_names: Sequence[str] = ()) -> bytes:
     """Draw maps in rows under a heading that names their exposure, PNG."""
     return map_plots.sheet(rows, f"{heading}, {SHOWN_RU:g} RU, sRGB", row_names)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A prepared method, XYZ of its map (views, 3), and the seconds of either."""
+
+    name: str
+    method: Method
+    xyz: Array
+    prepare_s: float
+    map_s: float
+
+    @property
+    def total_s(self) -> float:
+        return self.prepare_s + self.map_s
+
+
+def run(name: str, surface: BenchSurface, views: Map) -> Run:
+    """Run a method of the catalogue, from the height field to the map at normal incidence."""
+    method, prepare_s = timed(lambda: METHODS[name](surface.field, surface.config))
+    wi, wr = directions(views, NORMAL)
+    xyz, map_s = timed(lambda: method.xyz(wi, wr))
+    return Run(name, method, xyz, prepare_s, map_s)
+
+
+def on_elaphe(bench: Bench, name: str) -> Run:
+    """Run a method on the bench's Elaphe, its kernels compiled beforehand; once for all pages."""
+    if name not in bench.runs:
+        run(name, bench.elaphe, _WARM_UP)
+        bench.runs[name] = run(name, bench.elaphe, views_of(bench))
+    return bench.runs[name]
+
+
+def cosine_views(x: ArrayLike, y: ArrayLike = 0.0) -> Array:
+    """Return the views (n, 3) whose direction cosines along x and y are given, (n,) or one number each."""
+    x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    return np.stack([x, y, np.sqrt(1.0 - x**2 - y**2)], axis=-1)
+
+
+def under_normal_light(x: ArrayLike, y: ArrayLike = 0.0) -> tuple[Array, Array]:
+    """Return wi at normal incidence and wr, (n, 3) each, for direction cosines as `cosine_views` takes them."""
+    wr = cosine_views(x, y)
+    return np.broadcast_to(geometry.direction(0.0, 0.0), wr.shape).copy(), wr
+
+
+def window_on_sample_zero(field: HeightField) -> HeightField:
+    """Return the patch rolled by half its size: the window lies on sample 0, over the seams, as in public codes."""
+    ny, nx = field.shape
+    return HeightField(np.roll(field.heights_um, (ny // 2, nx // 2), axis=(0, 1)), field.pitch_um)
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Secondary horizontal bands above and below the primary one.
+
+    profile: mean luminance of each row (rows,), from the top. contrast: the largest rise above the darkest row
+    further in, over that row. share: of the light outside the primary band, the part that is such a rise.
+    """
+
+    profile: Array
+    contrast: float
+    share: float
+
+
+def bands_of(profile: Array, axis: Array, primary: float, reach: float = inf) -> Bands:
+    """Find the bands of an image's rows.
+
+    profile: mean luminance of each row (rows,). axis: place of each row from the mirror direction, evenly spaced, in
+    any unit. primary: half-width of the primary band; reach: where the search ends; both in that unit.
+    """
+    dark = _DARK_SHARE * float(profile.max())
+    contrast, excess, light = 0.0, 0.0, 0.0
+    for side in (axis <= 0.0, axis >= 0.0):
+        outwards = np.flatnonzero(side)[np.argsort(np.abs(axis[side]))]
+        values, distance = profile[outwards], np.abs(axis[outwards])
+        outside = (distance > primary) & (distance < reach)
+        floor = np.minimum.accumulate(values)[outside]
+        rise = values[outside] - floor
+        contrast = max(contrast, float(np.max(rise / np.maximum(floor, dark))))
+        excess, light = excess + float(rise.sum()), light + float(values[outside].sum())
+    return Bands(profile, contrast, excess / light)

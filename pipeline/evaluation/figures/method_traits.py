@@ -11,9 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from pipeline.arrays import Array
 from pipeline.diffraction.reference import STEP_NM
-from pipeline.evaluation.figures import planes
-from pipeline.evaluation.figures.bands import bands_of
-from pipeline.evaluation.figures.maps import lit_views
+from pipeline.evaluation.figures.maps import bands_of, lit_views, under_normal_light
 from pipeline.evaluation.figures.page import BenchSurface
 from pipeline.evaluation.methods.dft_terms import FULL
 from pipeline.evaluation.methods.flss import Flss
@@ -65,7 +63,7 @@ def along_the_first_order(surface: BenchSurface, methods: Mapping[str, Method]) 
 
 
 def _profile(surface: BenchSurface, methods: Mapping[str, Method], sin_theta: Array) -> Profile:
-    wi, wr = planes.under_normal_light(sin_theta)
+    wi, wr = under_normal_light(sin_theta)
     # Y that |P|^2 = 1 would give
     mirror = brdf.direction_factor(surface.config.material, trapezoid(surface.config.light, STEP_NM), wi, wr)
     return Profile(sin_theta, {name: method.xyz(wi, wr)[:, 1] / mirror for name, method in methods.items()})
@@ -87,7 +85,7 @@ def lit_share(surface: BenchSurface, method: Method) -> float:
     """Return the share of views in the right half of the primary horizontal band that are not black at 1500 RU."""
     along, across = _PRIMARY_SAMPLES
     x, y = np.meshgrid(np.linspace(*_PRIMARY_X, along), np.linspace(-_PRIMARY_Y, _PRIMARY_Y, across))
-    xyz = method.xyz(*planes.under_normal_light(x.ravel(), y.ravel()))
+    xyz = method.xyz(*under_normal_light(x.ravel(), y.ravel()))
     return float(np.mean(lit_views(xyz / surface.unit)))
 
 

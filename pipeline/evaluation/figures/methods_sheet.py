@@ -9,9 +9,7 @@ from pipeline.arrays import Array
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures import method_traits as traits
-from pipeline.evaluation.figures.bands import VISIBLE_CONTRAST
-from pipeline.evaluation.figures.maps import SHOWN_RU
-from pipeline.evaluation.figures.method_runs import on_elaphe, run
+from pipeline.evaluation.figures.maps import SHOWN_RU, VISIBLE_CONTRAST, on_elaphe, run
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageTable, PageText, Picture, numbers
 from pipeline.evaluation.methods.catalogue import BUMPS, EXACT, FLSS, GEMS, METHODS, NMM, PQ, STAM
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, Method

@@ -14,7 +14,7 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 
 if TYPE_CHECKING:
-    from pipeline.evaluation.figures.method_runs import Run
+    from pipeline.evaluation.figures.maps import Run
 
 # a number, several that are written together, a text, or nothing
 Cell = float | tuple[float, ...] | str | None
@@ -199,7 +199,7 @@ class Bench:
     """The surfaces that all pages measure.
 
     quick: smaller maps and fewer points, for a first look and for tests. runs: methods applied to Elaphe, by name,
-    which several pages show (pipeline.evaluation.figures.method_runs).
+    which several pages show (pipeline.evaluation.figures.maps).
     """
 
     blazed: BenchSurface

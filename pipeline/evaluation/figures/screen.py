@@ -9,9 +9,8 @@ from pipeline.arrays import Array
 from pipeline.config.models import DEFAULT_DELTA_E, Accuracy
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures import planes
-from pipeline.evaluation.figures.bands import VISIBLE_CONTRAST, Bands
 from pipeline.evaluation.figures.laser_screen import DELTA_E, LIGHT, Colour, Screen, experiment, screen_bands
+from pipeline.evaluation.figures.maps import VISIBLE_CONTRAST, Bands, window_on_sample_zero
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageText, Picture
 from pipeline.evaluation.methods.catalogue import BUMPS, EXACT, METHODS, OURS, PAPER, STAM
 from pipeline.evaluation.methods.paper_shaders import PaperLookUp
@@ -108,7 +107,7 @@ def _colours(surface: BenchSurface) -> dict[str, Colour]:
         OURS: METHODS[OURS](field, config).xyz,
         OURS_DEFAULT: METHODS[OURS](field, config.model_copy(update={"accuracy": Accuracy()})).xyz,
         PAPER: METHODS[PAPER](field, config).xyz,
-        PAPER_AT_ZERO: PaperLookUp(planes.window_on_sample_zero(field), config).xyz,
+        PAPER_AT_ZERO: PaperLookUp(window_on_sample_zero(field), config).xyz,
         STAM: METHODS[STAM](field, config).xyz,
         STAM_DISC: StamGaussian(field, config, DiscWindow()).xyz,
         BUMPS: METHODS[BUMPS](field, config).xyz,

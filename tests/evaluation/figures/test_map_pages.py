@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
-from pipeline.evaluation.figures import map_physics, method_traits, planes
-from pipeline.evaluation.figures.maps import NORMAL, blazed_recipe, directions, lit_views
+from pipeline.evaluation.figures import map_physics, method_traits
+from pipeline.evaluation.figures.maps import NORMAL, blazed_recipe, directions, lit_views, under_normal_light
 from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.figures.truncated_series import ChebyshevSeries, TaylorSeries
 from pipeline.evaluation.methods.catalogue import METHODS
@@ -105,7 +105,7 @@ def test_the_blaze_is_the_reference_in_closed_form(bench: Bench) -> None:
     """sinc^2(m - |w| h / lambda) under the window, against the sum over 25 samples a period."""
     recipe, config = blazed_recipe(bench), bench.blazed.config
     x = np.linspace(-0.6, 0.6, 61)
-    wi, wr = planes.under_normal_light(x)
+    wi, wr = under_normal_light(x)
     exact = bench.blazed.reference().xyz(config.light, config.material, wi, wr)[:, 1]
     closed = map_physics.blazed_luminance(config, recipe, wr)
     assert np.max(np.abs(closed - exact)) < 5e-3 * np.max(exact)

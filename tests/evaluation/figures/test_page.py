@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures import planes
-from pipeline.evaluation.figures.bands import bands_of
+from pipeline.evaluation.figures.maps import bands_of, under_normal_light, window_on_sample_zero
 from pipeline.evaluation.figures.page import Column, Page, PageTable, numbers
 from pipeline.evaluation.sources import SOURCES
 from pipeline.surface.heightfield import HeightField
@@ -62,8 +61,8 @@ def test_the_search_for_bands_ends_at_its_reach(reach: float) -> None:
 
 
 def test_views_are_unit_vectors_and_the_corner_becomes_the_middle() -> None:
-    wi, wr = planes.under_normal_light(np.array([0.0, 0.3]), np.array([0.4, -0.5]))
+    wi, wr = under_normal_light(np.array([0.0, 0.3]), np.array([0.4, -0.5]))
     np.testing.assert_allclose(np.linalg.norm(wr, axis=1), 1.0)
     np.testing.assert_array_equal(wi, [[0.0, 0.0, 1.0]] * 2)
     field = HeightField(np.arange(30.0).reshape(5, 6), (0.1, 0.2))
-    assert planes.window_on_sample_zero(field).heights_um[5 // 2, 6 // 2] == field.heights_um[0, 0]
+    assert window_on_sample_zero(field).heights_um[5 // 2, 6 // 2] == field.heights_um[0, 0]
