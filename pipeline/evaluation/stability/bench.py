@@ -1,5 +1,6 @@
 """`bench stability`: the sweep, its criterion, and the files that hold them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,12 +35,10 @@ class StabilityResults:
 
     def files(self) -> dict[str, str | bytes]:
         """Return stability.json, stability.csv (a row a case) and stability.png by name."""
-        from pipeline.evaluation.plots import stability_plots
-
         return {
             "stability.json": results.json_text(self.document()),
             "stability.csv": results.csv_text([_row(outcome) for outcome in self.outcomes]),
-            "stability.png": stability_plots.error_by_height(self.outcomes),
+            "stability.png": _error_by_height(self.outcomes),
         }
 
 
@@ -60,3 +59,39 @@ def _row(outcome: Outcome) -> dict[str, Any]:
         "speckle_error": outcome.speckle_error,
         "message": check.remark,
     }
+
+
+def _error_by_height(outcomes: Sequence[Outcome]) -> bytes:
+    """The worst error of |P|^2 against the span of heights, a curve a basis and precision, PNG."""
+    from pipeline.evaluation.plots import palette
+    from pipeline.evaluation.plots.charts import Chart, Series, charts
+
+    by_height = [outcome for outcome in outcomes if outcome.case.family.startswith("height")]
+    series = []
+    for (basis, precision), colour in zip(
+        sweep.SERIES, (palette.ORANGE, palette.VERMILION, palette.SKY, palette.BLUE), strict=True
+    ):
+        for algorithm, style, where in (("series", ".-", ""), ("device", "o", ", on the device")):
+            points = sorted(
+                (outcome.case.height_um, outcome.speckle_error)
+                for outcome in by_height
+                if outcome.speckle_error is not None
+                and (outcome.case.algorithm, outcome.case.basis, outcome.case.precision)
+                == (algorithm, basis, precision)
+            )
+            if points:
+                label, (heights, errors) = f"{basis.capitalize()}, {precision}{where}", zip(*points, strict=True)
+                series.append(Series(label, heights, errors, colour, style))
+    refused = [outcome.case.height_um for outcome in by_height if outcome.verdict == "refused"]
+    chart = Chart(
+        "Taylor fails where Chebyshev holds",
+        "span of heights (µm)",
+        "worst error of |P|² / max(|P|², 1e-3 of its mean)",
+        series,
+        x_scale="log",
+        marks=[(min(refused), "the paper's tables are refused from here")] if refused else [],
+        level=(verdict.CHEBYSHEV_TOLERANCE, "tolerance of Chebyshev, float32"),
+        floor=1e-13,
+        y_limits=(1e-13, 1e3),
+    )
+    return charts([[chart]], (8.6, 5.2))

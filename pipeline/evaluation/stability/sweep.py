@@ -7,7 +7,7 @@ from pipeline.diffraction.dft_stack import Basis
 from pipeline.evaluation.stability.case import Kind, Precision, StressCase
 
 _BASE = StressCase("", "device", "chebyshev", "float32", "noise", 0.5, (128, 128), (0.1, 0.1), 3.2)
-_SERIES: tuple[tuple[Basis, Precision], ...] = (
+SERIES: tuple[tuple[Basis, Precision], ...] = (
     ("taylor", "float32"),
     ("taylor", "float64"),
     ("chebyshev", "float32"),
@@ -33,7 +33,7 @@ def tall() -> list[StressCase]:
 def _by_height(quick: bool) -> Iterator[StressCase]:
     heights = (1e-3, 0.1, 0.5, 2.0, 10.0) if quick else _SERIES_HEIGHTS_UM
     for height in heights:
-        for basis, precision in _SERIES:
+        for basis, precision in SERIES:
             yield replace(
                 _BASE, family="height, series", algorithm="series", basis=basis, precision=precision, height_um=height
             )
