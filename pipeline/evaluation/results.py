@@ -5,6 +5,7 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -36,22 +37,23 @@ def document(checks: Sequence[Check], **measured: Any) -> dict[str, Any]:
     return {
         "versions": provenance.versions(),
         "device": provenance.device(),
-        "checks": [check.document() for check in checks],
-        **{key: plain(value) for key, value in measured.items()},
+        **plain({"checks": checks, **measured}),
     }
 
 
 def plain(value: Any) -> Any:
-    """Return dataclasses as dictionaries, and numpy's types as JSON's, at any depth."""
+    """Return dataclasses as dictionaries, and numpy's types as JSON's, at any depth; None for infinities and NaN."""
     if isinstance(value, Check):
-        return value.document()
+        return plain(value.document())
     if is_dataclass(value):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def json_text(content: Mapping[str, Any]) -> str:

@@ -1,10 +1,16 @@
 """Words of the evaluation as files: texts/NAME.toml of a package holds statements, captions, headings and remarks."""
 
 import tomllib
+from dataclasses import fields
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pipeline.evaluation.check import Check
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 
 class Texts:
@@ -27,7 +33,10 @@ class Texts:
 
         known: values of its texts, and fields of `Check` that are computed (bound, tolerance, remark).
         """
-        words = {"id": key, **self.words["checks"][key]}
-        filled = {name: self.fill(each, **known) if isinstance(each, str) else each for name, each in words.items()}
-        computed = {name: each for name, each in known.items() if name in Check.__dataclass_fields__}
-        return Check(**{**filled, **computed, "value": value})
+        return self.filled(Check, {"id": key, **self.words["checks"][key]}, known, value=value)
+
+    def filled(self, made: type[T], words: dict[str, Any], known: dict[str, Any], **measured: Any) -> T:
+        """Make a dataclass of a section's texts, fields of it that are among `known`, and what was measured."""
+        texts = {name: self.fill(each, **known) if isinstance(each, str) else each for name, each in words.items()}
+        computed = {field.name: known[field.name] for field in fields(made) if field.name in known}
+        return made(**{**texts, **computed, **measured})

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
+from pipeline.evaluation import results
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.plots.charts import Chart, Series
 from pipeline.evaluation.texts import Texts
@@ -61,15 +61,7 @@ class PageTable:
     @property
     def records(self) -> list[dict[str, Any]]:
         """Every row as numbers by column, for JSON: what is not finite is None."""
-        return [dict(zip(self.headings, map(_plain, row), strict=True)) for row in self.rows]
-
-
-def _plain(cell: Cell) -> Any:
-    if isinstance(cell, tuple):
-        return [_plain(each) for each in cell]
-    if cell is None or isinstance(cell, str):
-        return cell
-    return float(cell) if isfinite(cell) else None
+        return [dict(zip(self.headings, results.plain(list(row)), strict=True)) for row in self.rows]
 
 
 @dataclass(frozen=True)
@@ -99,19 +91,10 @@ class Page:
 
     def document(self) -> dict[str, Any]:
         """Return everything that was measured, for JSON; a check without a source of its own has the page's."""
-        return {
-            "name": self.name,
-            "title": self.title,
-            "source": self.source,
-            "checks": [
-                {
-                    key: _plain(value)
-                    for key, value in replace(check, source=check.source or self.source).document().items()
-                }
-                for check in self.checks
-            ],
-            "tables": {table.id: table.records for table in self.tables},
-        }
+        checks = [replace(check, source=check.source or self.source) for check in self.checks]
+        tables = {table.id: table.records for table in self.tables}
+        words = {"name": self.name, "title": self.title, "source": self.source}
+        return {**words, "checks": results.plain(checks), "tables": tables}
 
 
 class PageText(Texts):
@@ -140,12 +123,7 @@ class PageText(Texts):
 
     def chart(self, key: str, series: Sequence[Series], /, **known: Any) -> Chart:
         """Return [charts.KEY] with its curves. known: values of its texts, and computed fields of `Chart`."""
-        words = {
-            name: self.fill(each, **known) if isinstance(each, str) else each
-            for name, each in self.words["charts"][key].items()
-        }
-        computed = {name: each for name, each in known.items() if name in Chart.__dataclass_fields__}
-        return Chart(**{**words, **computed, "series": series})
+        return self.filled(Chart, self.words["charts"][key], known, series=series)
 
     def remark(self, key: str, /, **values: Any) -> str:
         """Return a text of [remarks]."""

@@ -15,6 +15,7 @@ from math import cos, pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
 from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
@@ -110,14 +111,10 @@ def persistent(values: Array, f: Array, count: int, apart: float) -> Array:
     Raises AccuracyError where there are fewer.
     """
     mean = np.mean(values / values.max(axis=1, keepdims=True), axis=0)
-    tops = 1 + np.flatnonzero((mean[1:-1] > mean[:-2]) & (mean[1:-1] >= mean[2:]))
-    chosen: list[int] = []
-    for top in tops[np.argsort(mean[tops])[::-1]]:
-        if all(abs(f[top] - f[other]) >= apart for other in chosen):
-            chosen.append(int(top))
-    if len(chosen) < count:
-        raise AccuracyError(f"expected {count} peaks of the reflectance, found {len(chosen)}: too small a patch?")
-    return np.asarray(f[chosen[:count]])
+    tops = find_peaks(mean, distance=max(1.0, apart / (f[1] - f[0])))[0]
+    if len(tops) < count:
+        raise AccuracyError(f"expected {count} peaks of the reflectance, found {len(tops)}: too small a patch?")
+    return np.asarray(f[tops[np.argsort(-mean[tops])[:count]]])
 
 
 def peaks(

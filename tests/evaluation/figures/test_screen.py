@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, xyz_direct
-from pipeline.evaluation.figures.laser_screen import LIGHT, Screen, experiment, screen_bands
+from pipeline.evaluation.figures.screen import LIGHT, Screen, experiment, screen_bands
 from pipeline.optics import geometry
 from pipeline.optics.csv_columns import shipped
 from pipeline.optics.light import illuminant_at, trapezoid
