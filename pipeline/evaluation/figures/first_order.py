@@ -4,7 +4,7 @@ Every estimate of a row's period by the exact |P|^2: with the window and the lig
 several definitions for the blazed grating, and by the methods of [S14].
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,8 +16,8 @@ from pipeline.evaluation.figures import peaks
 from pipeline.evaluation.figures.maps import window_on_sample_zero
 from pipeline.evaluation.figures.page import BenchSurface
 from pipeline.evaluation.figures.peaks import Band, Plane, Power
-from pipeline.evaluation.methods.catalogue import FLSS, METHODS, NMM, PQ
-from pipeline.evaluation.methods.method import Monochromatic
+from pipeline.evaluation.methods.catalogue import FLSS, NMM, PQ
+from pipeline.evaluation.methods.flss import Flss, Pq
 from pipeline.optics.gratings import period_um, viewing_angle
 from pipeline.optics.light import Light
 from pipeline.surface.conditioning import condition
@@ -32,6 +32,7 @@ _APART_SIGMAS = 3.0
 _BRIGHTER = "light from the brighter side"
 _TURNS_DEG = (-2.0, 2.0)
 ANGLE_GRID_DEG = 0.01
+_SHADERS: dict[str, type[Flss] | type[Pq]] = {FLSS: Flss, PQ: Pq}
 
 
 @dataclass(frozen=True)
@@ -125,10 +126,7 @@ class Powers:
 
     def of(self, name: str, field: HeightField, sigma_um: float) -> Power:
         """Return the power of a field under a window; each name must belong to one field."""
-        key = (name, sigma_um)
-        if key not in self._made:
-            self._made[key] = Reference(field, sigma_um, RANGE_NM[0]).power
-        return self._made[key]
+        return self._once((name, sigma_um), lambda: Reference(field, sigma_um, RANGE_NM[0]).power)
 
     def on(self, surface: BenchSurface, widths: float = 1.0) -> Power:
         """Return the power of a surface under its window, made wider by a factor."""
@@ -136,12 +134,13 @@ class Powers:
 
     def by(self, name: str, surface: BenchSurface) -> Power:
         """Return the power of a surface by a method of [S14], over the range of table 1."""
-        if (surface.name, name) not in self._made:
-            config = surface.config.model_copy(update={"light": Light(range_nm=RANGE_NM)})
-            method = METHODS[name](surface.field, config)
-            assert isinstance(method, Monochromatic)
-            self._made[surface.name, name] = method.power
-        return self._made[surface.name, name]
+        config = surface.config.model_copy(update={"light": Light(range_nm=RANGE_NM)})
+        return self._once((surface.name, name), lambda: _SHADERS[name](surface.field, config).power)
+
+    def _once(self, key: tuple[str, float | str], make: Callable[[], Power]) -> Power:
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
 
 
 def first_order(row: Row, surface: BenchSurface, powers: Powers, lambda_nm: Array) -> FirstOrder:
@@ -158,51 +157,39 @@ def cut_of(power: Power, plane: Plane, row: Row, band: Band, lambda_nm: Array) -
     lines = []
     for start in peaks.persistent(values, f, len(row.published), _APART_SIGMAS * band.sigma_f):
         raw = peaks.peaks(power, plane, np.full(len(lambda_nm), start), lambda_nm, band.sigma_f)
-        lines.append((_periods(raw), _periods(peaks.lines(power, plane, raw, lambda_nm, band.sigma_f))))
+        lines.append((Periods(1e3 / raw), Periods(1e3 / peaks.lines(power, plane, raw, lambda_nm, band.sigma_f))))
     # the longer period first, as table 1 has them
     lines.sort(key=lambda pair: -pair[1].mean)
-    return Cut(plane, values, _periods(best), tuple(lines))
-
-
-def _periods(f: Array) -> Periods:
-    return Periods(1e3 / f)
+    return Cut(plane, values, Periods(1e3 / best), tuple(lines))
 
 
 def _brightest(power: Power, plane: Plane, band: Band, lambda_nm: Array) -> Periods:
     """The period of each wavelength's largest reflectance, refined by a parabola."""
     f = band.grid()
-    return _periods(peaks.brightest(peaks.reflectance(power, plane, f, lambda_nm), f))
+    return Periods(1e3 / peaks.brightest(peaks.reflectance(power, plane, f, lambda_nm), f))
 
 
-@dataclass(frozen=True)
-class Blaze:
-    """The first order of the blazed grating by several definitions.
+def blaze_of(found: FirstOrder, powers: Powers, lambda_nm: Array) -> dict[str, Periods]:
+    """Estimate the period of the blazed grating by every definition.
 
-    raw: peaks of eq. 4's reflectance. shadowed: of the surface's material. wide: raw at twice the window.
-    extrapolated: of raw and wide, to a line of no width. line: at one s. on_grid: raw, on angles 0.01 deg apart.
+    raw: peaks of eq. 4's reflectance. on_grid: raw, on angles 0.01 deg apart. shadowed: of the surface's material.
+    wide: raw at twice the window. extrapolated: of raw and wide, to a line of no width. line: at one s.
     """
-
-    raw: Periods
-    shadowed: Periods
-    wide: Periods
-    extrapolated: Periods
-    line: Periods
-    on_grid: Periods
-
-
-def blaze_of(found: FirstOrder, powers: Powers, lambda_nm: Array) -> Blaze:
-    """Estimate the period of the blazed grating by every definition."""
     surface, plane, width = found.surface, found.cut.plane, found.band.sigma_f
     raw, line = found.cut.lines[0]
     start, material = 1e3 / raw.nm, surface.config.material
-    shadowed = peaks.peaks(powers.on(surface), plane, start, lambda_nm, width, material)
-    wide = _periods(peaks.peaks(powers.on(surface, 2.0), plane, start, lambda_nm, 0.5 * width))
-    # the shift is proportional to sigma_f^2, a quarter at twice the window
-    extrapolated = Periods((4.0 * wide.nm - raw.nm) / 3.0)
     angles = np.degrees(viewing_angle(THETA_I, 1e-3 * raw.nm, 1e-3 * lambda_nm))
     rounded = np.radians(ANGLE_GRID_DEG * np.rint(angles / ANGLE_GRID_DEG))
-    on_grid = Periods(1e3 * period_um(THETA_I, rounded, 1e-3 * lambda_nm))
-    return Blaze(raw, _periods(shadowed), wide, extrapolated, line, on_grid)
+    wide = Periods(1e3 / peaks.peaks(powers.on(surface, 2.0), plane, start, lambda_nm, 0.5 * width))
+    return {
+        "raw": raw,
+        "on_grid": Periods(1e3 * period_um(THETA_I, rounded, 1e-3 * lambda_nm)),
+        "shadowed": Periods(1e3 / peaks.peaks(powers.on(surface), plane, start, lambda_nm, width, material)),
+        "wide": wide,
+        # the shift is proportional to sigma_f^2, a quarter at twice the window
+        "extrapolated": Periods((4.0 * wide.nm - raw.nm) / 3.0),
+        "line": line,
+    }
 
 
 @dataclass(frozen=True)
@@ -225,25 +212,16 @@ class ByPosition:
 
 def by_position(found: FirstOrder, count: int) -> ByPosition:
     """Move the window over the patch of a surface."""
-    row, surface, plane, f = found.row, found.surface, found.cut.plane, found.band.grid()
-    field = surface.field if row.axis == "x" else _transposed(surface.field)
+    row, surface, plane, f, field = found.row, found.surface, found.cut.plane, found.band.grid(), found.surface.field
+    if row.axis == "y":
+        field = HeightField(np.ascontiguousarray(field.heights_um.T), field.pitch_um[::-1])
     s = peaks.phase_rate(plane, float(f.mean()), _MIDDLE_NM)
     values = peaks.by_position(field, surface.sigma_um, s, f, count)
     # C at the wavelength decides which of several lines is the brightest
-    factor = peaks.reflectance(_mirror, plane, f, np.array([_MIDDLE_NM]))[0]
+    factor = peaks.reflectance(lambda uvw, nm: np.ones((len(uvw), len(nm))), plane, f, np.array([_MIDDLE_NM]))[0]
     periods = 1e3 / peaks.brightest((values * factor).reshape(-1, len(f)), f)
     mean = 1e3 / peaks.brightest(values.mean(axis=(0, 1)) * factor, f)
     return ByPosition(row, periods.reshape(values.shape[:-1]), mean)
-
-
-def _mirror(uvw: Array, lambda_nm: Array) -> Array:
-    """|P|^2 = 1 everywhere."""
-    return np.ones((len(uvw), len(lambda_nm)))
-
-
-def _transposed(field: HeightField) -> HeightField:
-    """The field with x and y exchanged."""
-    return HeightField(np.ascontiguousarray(field.heights_um.T), field.pitch_um[::-1])
 
 
 def variants(found: FirstOrder, powers: Powers, lambda_nm: Array) -> Iterator[tuple[str, Periods]]:
@@ -287,6 +265,6 @@ def by_shaders(found: FirstOrder, powers: Powers, lambda_nm: Array) -> dict[str,
     values = peaks.reflectance(flss, plane, coefficients, lambda_nm)
     return {
         FLSS: _brightest(flss, plane, band, lambda_nm),
-        NMM: _periods(coefficients[np.argmax(values, axis=1)]),
+        NMM: Periods(1e3 / coefficients[np.argmax(values, axis=1)]),
         PQ: _brightest(pq, plane, band, lambda_nm),
     }

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from math import cos, pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from pipeline.arrays import Array
@@ -90,14 +89,9 @@ def _own_wavelength(power: Power, uvw: Array, lambda_nm: Array) -> Array:
 
 def brightest(values: Array, f: Array) -> Array:
     """Return the frequency (L,) of each row's largest value (L, k) on a grid `f` (k,), refined by a parabola."""
-    place = np.argmax(values, axis=1)
-    return _parabola(values, f, np.clip(place, 1, len(f) - 2))
-
-
-def _parabola(values: Array, f: Array, place: NDArray[np.intp]) -> Array:
-    """The top of the parabola through three samples' logarithms about each place: exact for a Gaussian."""
-    rows = np.arange(len(values))
+    place, rows = np.clip(np.argmax(values, axis=1), 1, len(f) - 2), np.arange(len(values))
     tiny = np.finfo(float).tiny
+    # through the logarithms of three samples: exact for a Gaussian
     below, here, above = (np.log(np.maximum(values[rows, place + k], tiny)) for k in (-1, 0, 1))
     bend = below - 2.0 * here + above
     offset = np.where(bend < 0.0, 0.5 * (below - above) / np.where(bend < 0.0, bend, 1.0), 0.0)

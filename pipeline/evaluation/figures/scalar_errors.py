@@ -40,20 +40,22 @@ def sawtooth(x: Array) -> Array:
 
 @dataclass(frozen=True)
 class Shape:
-    """A profile; columns: of the coarser staircase, whose layers a symmetric profile halves."""
+    """A profile.
+
+    columns: of the coarser staircase, whose layers a symmetric profile halves. quoted: errors of its class. power:
+    |c_1|^2 at s = k w and depths from crest to valley.
+    """
 
     profile: Profile
     columns: int
     quoted: tuple[tuple[float, ...], ...]
-
-    def power(self, s: Array, depth: Array) -> Array:
-        """Return |c_1|^2 at s = k w, depths from crest to valley."""
-        if self.profile is cosine:
-            return gratings.sinusoid(float(_ORDER), s, 0.5 * depth)
-        return gratings.blaze(float(_ORDER), s, depth)
+    power: Callable[[Array, Array], Array]
 
 
-SHAPES = {"sinusoid": Shape(cosine, 24, scalar_domain.SMOOTH), "blaze": Shape(sawtooth, 16, scalar_domain.EDGED)}
+SHAPES = {
+    "sinusoid": Shape(cosine, 24, scalar_domain.SMOOTH, lambda s, depth: gratings.sinusoid(_ORDER, s, 0.5 * depth)),
+    "blaze": Shape(sawtooth, 16, scalar_domain.EDGED, lambda s, depth: gratings.blaze(_ORDER, s, depth)),
+}
 
 
 @dataclass(frozen=True)
@@ -161,20 +163,23 @@ class Sweep:
         cases = [GratingCase(shape, material, theta_deg, period) for period in self.periods]
         return np.stack([getattr(self.results[case], what) for case in cases], axis=1)
 
-    def largest(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
-        """Return the largest magnitude (depths, periods) over materials and lights."""
-        cases = [[c for c in self.cases() if c.shape == shape and c.period == period] for period in self.periods]
-        return np.stack(
-            [np.max([np.abs(what(self.results[case])) for case in each], axis=0) for each in cases], axis=1
-        )
-
     def by_class(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
-        """Return the same over periods from each of the table's on and depths up to each of them, in its shape."""
-        errors, periods, depths = self.largest(shape, what), np.array(self.periods), np.array(self.depths)
+        """Return the largest magnitude over materials and lights, in the shape of the quoted table.
+
+        It is that of periods from each of the table's on, and of depths up to each of them.
+        """
+        depths = np.array(self.depths)
         return np.array(
             [
                 [
-                    np.max(errors[np.ix_(depths <= depth, periods >= period)], initial=0.0)
+                    max(
+                        (
+                            np.max(np.abs(what(each))[depths <= depth], initial=0.0)
+                            for case, each in self.results.items()
+                            if case.shape == shape and case.period >= period
+                        ),
+                        default=0.0,
+                    )
                     for depth in scalar_domain.DEPTHS
                 ]
                 for period in scalar_domain.PERIODS

@@ -12,7 +12,6 @@ from pipeline.evaluation.figures.first_order import (
     RANGE_NM,
     ROWS,
     THETA_I,
-    Blaze,
     ByPosition,
     FirstOrder,
     Periods,
@@ -83,12 +82,12 @@ def make(bench: Bench, progress: Progress) -> Page:
     )
 
 
-def _blaze_checks(blaze: Blaze) -> Iterator[Check]:
+def _blaze_checks(blaze: _Variants) -> Iterator[Check]:
     published = ROWS[0].published[0][0]
     for key, found, bound in (
-        ("line", blaze.line, _TRUE_NM),
-        ("extrapolated", blaze.extrapolated, _TRUE_NM),
-        ("peak", blaze.raw, published),
+        ("line", blaze["line"], _TRUE_NM),
+        ("extrapolated", blaze["extrapolated"], _TRUE_NM),
+        ("peak", blaze["raw"], published),
     ):
         yield _TEXT.check(f"blazed.{key}", found.mean, bound=bound, tolerance=_WITHIN_NM)
 
@@ -110,19 +109,22 @@ def _period_rows(found: Sequence[FirstOrder]) -> Iterator[tuple[Cell, ...]]:
         for i, ((raw, line), printed) in enumerate(zip(each.cut.lines, each.row.published, strict=True)):
             brightest = each.cut.brightest.spread if i == 0 else None
             apart = 100.0 * (line.mean / printed[0] - 1.0)
-            yield each.row.label, _light_deg(each), printed, brightest, raw.spread, line.spread, apart
+            yield (
+                each.row.label,
+                np.degrees(each.cut.plane.azimuth),
+                printed,
+                brightest,
+                raw.spread,
+                line.spread,
+                apart,
+            )
 
 
-def _light_deg(found: FirstOrder) -> float:
-    return float(np.degrees(found.cut.plane.azimuth))
-
-
-def _blaze_table(blaze: Blaze) -> PageTable:
-    rows: list[tuple[Cell, ...]] = []
-    for key in ("raw", "on_grid", "shadowed", "wide", "extrapolated", "line"):
-        found: Periods = getattr(blaze, key)
-        rows.append((_TEXT.fill(_TEXT.words["tables"]["blazed"][key]), *found.spread, found.mean - _TRUE_NM))
-    return _TEXT.table("blazed", rows)
+def _blaze_table(blaze: _Variants) -> PageTable:
+    names, rows = _TEXT.words["tables"]["blazed"], blaze.items()
+    return _TEXT.table(
+        "blazed", [(_TEXT.fill(names[key]), *found.spread, found.mean - _TRUE_NM) for key, found in rows]
+    )
 
 
 def _shaders_table(found: Sequence[FirstOrder], shaders: Sequence[_Variants]) -> PageTable:
@@ -164,12 +166,10 @@ def _pictures(
         seen = np.concatenate([curve.y for curve in curves])
         near = np.linspace(np.nanmin(seen) - _MARGIN_DEG, np.nanmax(seen) + _MARGIN_DEG, views // 2)
         whole, close = ((at, _image(each, powers, fine_nm, at)) for at in (angles, near))
-        title = f"{each.row.label}, {each.surface.name}: light at 75°, φ = {_light_deg(each):.0f}°"
+        title = f"{each.row.label}, {each.surface.name}: light at 75°, φ = {np.degrees(each.cut.plane.azimuth):.0f}°"
         png = plots.reflectance(title, fine_nm, whole, close, curves)
         pictures.append(_TEXT.picture("reflectance", png, label=each.row.label))
-    panels = [
-        plots.Histogram(each.row.label, each.periods, [mean for mean, _ in each.row.published]) for each in moved
-    ]
+    panels = [(each.row.label, each.periods, [mean for mean, _ in each.row.published]) for each in moved]
     return [*pictures, _TEXT.picture("positions", plots.histograms(panels))]
 
 
@@ -184,12 +184,12 @@ def _angles(period_nm: Array, lambda_nm: Array) -> Array:
     return np.degrees(viewing_angle(THETA_I, period_nm, lambda_nm))
 
 
-def _blaze_remarks(found: FirstOrder, blaze: Blaze) -> list[str]:
+def _blaze_remarks(found: FirstOrder, blaze: _Variants) -> list[str]:
     samples = 1e-3 * _TRUE_NM / found.surface.field.pitch_um[0]
     return [
-        _TEXT.remark("line", shift=blaze.raw.mean - _TRUE_NM),
-        _TEXT.remark("sampling", left=blaze.line.mean - _TRUE_NM, samples=samples),
-        _TEXT.remark("variance", on_grid=blaze.on_grid.spread[1], raw=blaze.raw.spread[1]),
+        _TEXT.remark("line", shift=blaze["raw"].mean - _TRUE_NM),
+        _TEXT.remark("sampling", left=blaze["line"].mean - _TRUE_NM, samples=samples),
+        _TEXT.remark("variance", on_grid=blaze["on_grid"].spread[1], raw=blaze["raw"].spread[1]),
     ]
 
 

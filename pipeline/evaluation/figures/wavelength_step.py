@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Array
-from pipeline.diffraction.reference import STEP_NM, integrate
+from pipeline.diffraction.reference import STEP_NM
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures.maps import EXPOSURES_RU, NOTICEABLE, SHOWN_RU, STRICT_RU
@@ -14,9 +14,7 @@ from pipeline.evaluation.figures.page import Bench, BenchSurface, Page, PageText
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.plots.charts import Chart, Series, charts
 from pipeline.evaluation.plots.palette import BLUE, GREEN, VERMILION
-from pipeline.optics import geometry
 from pipeline.optics.colour import delta_e
-from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map
 
@@ -24,7 +22,6 @@ _STEPS_NM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 _SHOWN_NM = (1.0, 5.0, 10.0, 20.0, 50.0)
 _FINEST_NM = 0.5
 _ARTEFACTS_FROM_NM = 10.0
-_AT_ONCE = 2048
 
 
 @dataclass(frozen=True)
@@ -70,21 +67,12 @@ def make(bench: Bench, progress: Progress) -> Page:
 
 
 def _measure(surface: BenchSurface, views: Map, progress: Progress) -> _Steps:
-    """Compute |P|^2 once on the finest nodes; every other step's are among them."""
     config, exact = surface.config, surface.reference(progress)
-    rules = {step: trapezoid(config.light, step) for step in (_FINEST_NM, *_STEPS_NM)}
-    finest = rules[_FINEST_NM].lambda_nm
-    among = {step: np.searchsorted(finest, rule.lambda_nm - 0.5 * _FINEST_NM) for step, rule in rules.items()}
     wi, wr = maps.directions(views, maps.NORMAL)
-    xyz = {step: np.empty((len(wr), 3)) for step in rules}
-    for first in range(0, len(wr), _AT_ONCE):
-        part = slice(first, min(first + _AT_ONCE, len(wr)))
-        power = exact.power(geometry.uvw(wi[part], wr[part]), finest)
-        for step, rule in rules.items():
-            seen = power[:, among[step]]
-            found = integrate(seen, rule, config.material, surface.sigma_um, wi[part], wr[part])
-            xyz[step][part] = found / surface.unit
-        progress("wavelength steps", part.stop / len(wr))
+    xyz = {}
+    for step_nm in (_FINEST_NM, *_STEPS_NM):
+        found = exact.xyz(config.light, config.material, wi, wr, step_nm, progress)
+        xyz[step_nm] = found / surface.unit
     return _Steps(surface, xyz, maps.lit_views(xyz[_FINEST_NM]))
 
 

@@ -1,7 +1,6 @@
 """Reflectance over viewing angle and wavelength ([D14] fig. 7), and its peaks by the position of the window."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,6 @@ _GAMMA = 0.6
 # on grey, against which coloured curves are seen
 _MAP = "gray"
 _BINS = 60
-
-
-@dataclass(frozen=True)
-class Histogram:
-    """Brightest periods, nm, (positions, positions, 2 sides) of the window; published: periods to mark."""
-
-    title: str
-    periods: Array
-    published: Sequence[float]
 
 
 def reflectance(
@@ -62,22 +52,25 @@ def _draw(figure: Figure, axes: Any, lambda_nm: Array, angles: Array, values: Ar
     figure.colorbar(image, ax=axes, label="reflectance, C |P|²")
 
 
-def histograms(panels: Sequence[Histogram]) -> bytes:
-    """Draw a histogram of the brightest period for every surface, PNG; lines mark the middle and sample 0."""
+def histograms(panels: Sequence[tuple[str, Array, Sequence[float]]]) -> bytes:
+    """Draw a histogram of the brightest period for every surface, PNG; lines mark the middle and sample 0.
+
+    panels: title, periods in nm (positions, positions, 2 sides) of the window, and published periods to mark.
+    """
     figure = Figure(figsize=(11.0, 2.9 * len(panels)), layout="constrained")
     rows = np.atleast_1d(figure.subplots(len(panels), 1))
-    for axes, each in zip(rows, panels, strict=True):
-        ends = [float(each.periods.min()), float(each.periods.max()), *each.published]
+    for axes, (title, all_periods, published) in zip(rows, panels, strict=True):
+        ends = [float(all_periods.min()), float(all_periods.max()), *published]
         bins = np.linspace(min(ends), max(ends), _BINS + 1)
-        middle = len(each.periods) // 2
+        middle = len(all_periods) // 2
         for side, (colour, end) in enumerate(((BLUE, "the axis’ end"), (ORANGE, "its other end"))):
-            periods = each.periods[..., side]
+            periods = all_periods[..., side]
             axes.hist(periods.ravel(), bins, color=colour, alpha=0.55, label=f"light from {end}")
             axes.axvline(periods[middle, middle], color=colour, lw=1.6, label="window in the middle")
             axes.axvline(periods[0, 0], color=colour, ls=":", lw=1.8, label="window on sample 0")
-        for i, period in enumerate(each.published):
+        for i, period in enumerate(published):
             axes.axvline(period, color="black", ls="--", lw=1.4, label=None if i else "published")
-        axes.set(title=each.title, xlabel="brightest period (nm)", ylabel="positions of the window")
+        axes.set(title=title, xlabel="brightest period (nm)", ylabel="positions of the window")
     handles, names = rows[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
     return png(figure)
