@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.stability import sweep, verdict
-from pipeline.evaluation.stability.case import StressCase
+from pipeline.evaluation.stability.sweep import StressCase
 from tests.cli.tool import Tool, too_wide
 
 _NOISE = StressCase("height", "series", "chebyshev", "float32", "noise", 10.0, (40, 48), (0.1, 0.12), 1.2)

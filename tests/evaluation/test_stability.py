@@ -11,9 +11,8 @@ from pipeline.diffraction import dft_stack, expansion
 from pipeline.diffraction.reference import power_direct
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.stability import algorithms, sweep, verdict
-from pipeline.evaluation.stability.algorithms import one_wavelength
-from pipeline.evaluation.stability.case import Kind, Precision, StressCase
-from pipeline.evaluation.stability.measurement import NO_DIGITS, Measurement, directions
+from pipeline.evaluation.stability.algorithms import NO_DIGITS, Measurement, directions, one_wavelength
+from pipeline.evaluation.stability.sweep import Kind, Precision, StressCase
 from pipeline.evaluation.stability.verdict import Outcome
 
 NOISE = StressCase("height", "series", "chebyshev", "float32", "noise", 0.5, (48, 48), (0.1, 0.1), 1.2)

@@ -39,6 +39,8 @@ _MATERIALS = {
     "schlick": ("Schlick, n = 1.5, shadowing", Material(normalisation="relative")),
     "gold": ("gold, absolute", Material(fresnel="conductor", shadowing=False, normalisation="absolute")),
 }
+# albedos of gratings, integrated
+_Lobes = dict[KnownGrating, Array]
 
 
 def order_sum(grating: KnownGrating, sigma_um: float, w: float = -1.9) -> float:
@@ -108,15 +110,15 @@ def make(bench: Bench, progress: Progress) -> Page:
     flat = Reference(HeightField(np.zeros((8, 32)), (2.0, 2.0)), sigma_um, LAMBDA_MIN_NM)
     mirror = {deg: albedo(flat, sigma_um, np.radians(deg), _REACH) for deg in _MIRROR_DEG}
     progress("energy", 0.1)
-    lobes = {g.name: _albedos(g.field(g.samples), sigma_um, clear) for g in known}
+    lobes = {each: _albedos(each.field(each.samples), sigma_um, clear) for each in known}
     progress("energy", 0.3)
     snakes = {each.name: _albedos(each.field, each.sigma_um, angles) for each in (bench.elaphe, bench.xenopeltis)}
     progress("energy", 0.7)
     text = PageText("energy", lambda_nm=LAMBDA_NM)
     reciprocity = list(_reciprocity(text, bench.elaphe, _FEWER_PAIRS if bench.quick else _PAIRS))
     progress("energy", 1.0)
-    checks = [*_grating_checks(text, known, sigma_um, mirror, clear, lobes), *reciprocity]
-    picture = text.picture("albedo", _curves(text, known, clear, lobes, angles, snakes))
+    checks = [*_grating_checks(text, sigma_um, mirror, clear, lobes), *reciprocity]
+    picture = text.picture("albedo", _curves(text, clear, lobes, angles, snakes))
     return text.page(checks, [_table(text, known, angles, snakes)], [picture])
 
 
@@ -126,23 +128,17 @@ def _albedos(field: HeightField, sigma_um: float, angles: Sequence[float] | Arra
 
 
 def _grating_checks(
-    text: PageText,
-    known: Sequence[KnownGrating],
-    sigma_um: float,
-    mirror: dict[float, float],
-    clear: Sequence[float],
-    lobes: dict[str, Array],
+    text: PageText, sigma_um: float, mirror: dict[float, float], clear: Sequence[float], lobes: _Lobes
 ) -> Iterator[Check]:
-    for each in known:
+    for each in lobes:
         yield text.check("{key}.order_sum", abs(order_sum(each, sigma_um) - 1.0), key=each.key, grating=each.name)
     for deg, found in mirror.items():
-        yield text.check(
-            "mirror.{deg:g}", found, deg=deg, tolerance=_MIRROR_TOLERANCE if deg <= _JUDGED_MIRROR else None
-        )
+        tolerance = _MIRROR_TOLERANCE if deg <= _JUDGED_MIRROR else None
+        yield text.check("mirror.{deg:g}", found, deg=deg, tolerance=tolerance)
     # the hemisphere's integral against the sum over orders, |c_m|^2 G / w^2
     angles = ", ".join(f"{deg:g}" for deg in clear)
-    for each in known:
-        worst = np.max(np.abs(lobes[each.name] - closed_albedo(each, np.radians(clear))))
+    for each, integrated in lobes.items():
+        worst = np.max(np.abs(integrated - closed_albedo(each, np.radians(clear))))
         yield text.check("{key}.albedo", worst, key=each.key, grating=each.name, angles=angles)
 
 
@@ -164,22 +160,15 @@ def _table(text: PageText, known: Sequence[KnownGrating], angles: Array, snakes:
     return text.table("albedo", rows, numbers("{:.3f}", *(f"light at {deg:g}°" for deg in shown)))
 
 
-def _curves(
-    text: PageText,
-    known: Sequence[KnownGrating],
-    clear: Sequence[float],
-    lobes: dict[str, Array],
-    angles: Array,
-    snakes: dict[str, Array],
-) -> bytes:
+def _curves(text: PageText, clear: Sequence[float], lobes: _Lobes, angles: Array, snakes: dict[str, Array]) -> bytes:
     dense, ratios = np.linspace(0.0, 80.0, 641), np.geomspace(1.05, 20.0, 800)
-    closed, by_period, colours = [], [], dict(zip([*(g.name for g in known), *snakes], COLOURS, strict=False))
-    for each in known:
-        colour = colours[each.name]
+    closed, by_period = [], []
+    for each, colour in zip(lobes, COLOURS, strict=False):
         closed.append(Series(each.name, dense, closed_albedo(each, np.radians(dense)), colour, "-"))
-        closed.append(Series("", clear, lobes[each.name], colour, "o"))
+        closed.append(Series("", clear, lobes[each], colour, "o"))
         normal = [closed_albedo(each, np.zeros(1), 1e-3 * LAMBDA_NM * ratio)[0] for ratio in ratios]
         by_period.append(Series(each.name, ratios, normal, colour, "-"))
-    integrated = [Series(name, angles, found, colours[name]) for name, found in snakes.items()]
+    colours = COLOURS[len(lobes) :]
+    integrated = [Series(name, angles, snakes[name], colour) for name, colour in zip(snakes, colours, strict=False)]
     drawn = {"gratings": closed, "snakes": integrated, "periods": by_period}
     return charts([[text.chart(key, series) for key, series in drawn.items()]], (4.3, 4.3))

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from pipeline.diffraction import expansion, power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures.page import Bench, Page, PageTable, PageText, Picture, numbers
+from pipeline.evaluation.figures.page import Bench, Cell, Page, PageTable, PageText, Picture, numbers
 from pipeline.evaluation.plots.charts import Chart, Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
 from pipeline.optics import geometry, gratings
@@ -55,25 +54,24 @@ class KnownGrating:
     key: str
     name: str
     samples: int
-    recipe: Callable[[dict[str, Any]], Recipe]
+    recipe: Recipe
     power: Power
     sampled: Callable[[Array, Array, int], Array]
 
     def field(self, samples: int) -> HeightField:
         """Make a patch of whole periods with a number of samples each."""
-        pitch_um = (PERIOD_UM / samples, _PITCH_Y_UM)
-        return recipes.make(self.recipe({"period_um": PERIOD_UM, "size_um": _SIZE_UM, "pitch_um": pitch_um}))
+        return recipes.make(self.recipe.model_copy(update={"pitch_um": (PERIOD_UM / samples, _PITCH_Y_UM)}))
 
 
 def known_gratings() -> tuple[KnownGrating, ...]:
     """Return a sinusoid, a rectangle of half the period and a blaze."""
-    amplitude, step, blaze = 0.1, 0.15, 0.25
+    amplitude, step, blaze, common = 0.1, 0.15, 0.25, {"period_um": PERIOD_UM, "size_um": _SIZE_UM}
     return (
         KnownGrating(
             "sinusoid",
             f"sinusoid, a = {amplitude:g} µm",
             32,
-            lambda common: Sinusoid(kind="sinusoid", amplitude_um=amplitude, **common),
+            Sinusoid.model_validate({"kind": "sinusoid", "amplitude_um": amplitude, **common}),
             partial(gratings.sinusoid, amplitude_um=amplitude),
             # the part that a smooth phase folds back from beyond 16 orders is below rounding
             lambda m, s, _: gratings.sinusoid(m, s, amplitude),
@@ -82,7 +80,7 @@ def known_gratings() -> tuple[KnownGrating, ...]:
             "rectangle",
             f"rectangle, H = {step:g} µm",
             128,
-            lambda common: Rectangular(kind="rectangular", height_um=step, duty=0.5, **common),
+            Rectangular.model_validate({"kind": "rectangular", "height_um": step, "duty": 0.5, **common}),
             partial(gratings.rectangle, height_um=step, duty=0.5),
             lambda m, s, samples: gratings.sampled_rectangle(m, s, step, 0.5, samples),
         ),
@@ -90,7 +88,7 @@ def known_gratings() -> tuple[KnownGrating, ...]:
             "blaze",
             f"blaze, H = {blaze:g} µm",
             64,
-            lambda common: Blazed(kind="blazed", height_um=blaze, **common),
+            Blazed.model_validate({"kind": "blazed", "height_um": blaze, **common}),
             partial(gratings.blaze, height_um=blaze),
             lambda m, s, samples: gratings.sampled_blaze(m, s, blaze, samples),
         ),
@@ -247,19 +245,11 @@ def checks_of(grating: KnownGrating, found: Answers) -> Iterator[Check]:
 def _table(text: PageText, found: dict[str, Answers], at: Orders) -> PageTable:
     """Orders 0 and 1 under every light, at the wavelength in the middle."""
     middle = np.unique(at.lambda_nm)[len(np.unique(at.lambda_nm)) // 2]
-    rows = [
-        (
-            name,
-            at.order[i],
-            LIGHTS_DEG[at.light[i]],
-            each.profile[i],
-            each.reference[i],
-            each.direct[i],
-            each.polar[i],
-        )
-        for name, each in found.items()
-        for i in np.flatnonzero((at.lambda_nm == middle) & np.isin(at.order, (0, 1)))
-    ]
+    shown = np.flatnonzero((at.lambda_nm == middle) & np.isin(at.order, (0, 1)))
+    rows: list[tuple[Cell, ...]] = []
+    for name, each in found.items():
+        answers = np.stack([each.profile, each.reference, each.direct, each.polar], axis=-1)
+        rows += [(name, at.order[i], LIGHTS_DEG[at.light[i]], *answers[i]) for i in shown]
     return text.table("orders", rows, middle=middle)
 
 

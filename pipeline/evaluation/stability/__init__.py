@@ -1,7 +1,7 @@
 """Numerical stress test of |P|^2: each test case meets its tolerance or is refused; no error is silent.
 
-A case (`case.py`) is one surface, window and algorithm (`algorithms.py`), compared with `power_direct`, the plain sum
-over samples (`measurement.py`):
+A case (`sweep.py`) is one surface, window and algorithm (`algorithms.py`), compared with `power_direct`, the plain
+sum over samples:
 
 - "series": a DFT stack summed in memory in its own precision; Taylor or Chebyshev, float32 or float64;
 - "device": what the stages run: `Reference` (Chebyshev float64), the polar power spectrum E at its own nodes

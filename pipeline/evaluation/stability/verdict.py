@@ -10,10 +10,14 @@ from pipeline.diffraction.dft_stack import Basis
 from pipeline.errors import AccuracyError, BakeError
 from pipeline.evaluation.check import Check, Relation
 from pipeline.evaluation.stability import algorithms
-from pipeline.evaluation.stability.algorithms import TABLE_DELTA_E, TAYLOR_TOLERANCE, table_error
-from pipeline.evaluation.stability.case import Precision, StressCase
-from pipeline.evaluation.stability.measurement import NO_DIGITS, Measurement
-from pipeline.evaluation.stability.sweep import TALLEST_UM, TAYLOR_FAILS_UM
+from pipeline.evaluation.stability.algorithms import (
+    NO_DIGITS,
+    TABLE_DELTA_E,
+    TAYLOR_TOLERANCE,
+    Measurement,
+    table_error,
+)
+from pipeline.evaluation.stability.sweep import TALLEST_UM, TAYLOR_FAILS_UM, Precision, StressCase
 from pipeline.optics.coherence import folded_window
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
@@ -132,19 +136,12 @@ def criterion(outcomes: Sequence[Outcome]) -> list[Check]:
             and (outcome.case.basis, outcome.case.precision, outcome.case.height_um) == (basis, precision, height_um)
         )
 
-    judged: tuple[tuple[Basis, Precision, float, Relation], ...] = (
-        ("chebyshev", "float32", TALLEST_UM, "<="),
-        ("taylor", "float64", TAYLOR_FAILS_UM, ">"),
-    )
+    def check(basis: Basis, precision: Precision, height_um: float, relation: Relation, remark: str) -> Check:
+        name = f"stability.{basis}_{precision}_at_{height_um:g}_um"
+        what, error = f"{basis.capitalize()} {precision} at {height_um:g} um", worst(basis, precision, height_um)
+        return Check(name, what, error, relation, CHEBYSHEV_TOLERANCE, source="criterion 5", remark=remark)
+
     return [
-        Check(
-            f"stability.{basis}_{precision}_at_{height_um:g}_um",
-            f"{basis.capitalize()} {precision} at {height_um:g} um",
-            worst(basis, precision, height_um),
-            relation,
-            CHEBYSHEV_TOLERANCE,
-            source="criterion 5",
-            remark="worst error" if relation == "<=" else "worst error: the series has failed",
-        )
-        for basis, precision, height_um, relation in judged
+        check("chebyshev", "float32", TALLEST_UM, "<=", "worst error"),
+        check("taylor", "float64", TAYLOR_FAILS_UM, ">", "worst error: the series has failed"),
     ]
