@@ -12,7 +12,7 @@ from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures.maps import SHOWN_RU, STRICT_RU
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Page, PageText, Picture
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
-from pipeline.evaluation.methods.paper_shaders import PUBLISHED_POWER, PUBLISHED_RESOLUTION, TOLERANCE, taylor_stack
+from pipeline.evaluation.methods.paper_shaders import PUBLISHED_POWER, PUBLISHED_RESOLUTION, taylor_stack
 from pipeline.evaluation.plots.charts import Chart, Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
 from pipeline.optics.colour import delta_e, displayed_srgb
@@ -74,7 +74,7 @@ def make(bench: Bench, progress: Progress) -> Page:
 def _measure(surface: BenchSurface, views: Map, exact: Array, sizes: Sequence[int], progress: Progress) -> _Grids:
     radiometry = surface.config.radiometry
     rule = radiometry.integrand(PUBLISHED_STEP_NM)
-    built = taylor_stack(surface.field, surface.config, TOLERANCE)
+    built = taylor_stack(surface.field, surface.config)
     wi, wr = maps.directions(views, maps.NORMAL)
     fine, found = _steps(views, exact), {}
     for nodes in sizes:

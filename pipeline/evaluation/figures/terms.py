@@ -1,24 +1,37 @@
-"""[D14] fig. 15, [S14] fig. 2.11 and 2.12: the number of terms that the series of exp(i k w h) needs."""
+"""[D14] fig. 15, [S14] fig. 2.11 and 2.12: the number of terms that the series of exp(i k w h) needs.
+
+Taylor's series about two origins and Chebyshev's are summed at the views themselves, at the same wavelengths, so what
+differs is the order alone. Light falls at normal incidence: of the frequencies no more than 1 / lambda is kept.
+"""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 
 import numpy as np
+from scipy.special import comb
 
+from kernels import windowed_dft
 from pipeline.accuracy.checks import MAP_RADIUS
 from pipeline.arrays import Array
-from pipeline.diffraction import expansion
+from pipeline.diffraction import dft_stack, expansion
+from pipeline.diffraction.dft_stack import Basis, Stack
+from pipeline.diffraction.reference import integrate
+from pipeline.diffraction.upload import upload
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import map_physics, maps
 from pipeline.evaluation.figures.maps import NOTICEABLE, SHOWN_RU, STRICT_RU
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageTable, PageText, Picture, numbers
-from pipeline.evaluation.figures.truncated_series import STEP_NM, ChebyshevSeries, TaylorSeries
+from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
 from pipeline.evaluation.plots.charts import Chart, Series, charts
 from pipeline.evaluation.plots.palette import COLOURS
+from pipeline.optics import brdf, geometry
 from pipeline.optics.colour import delta_e
+from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress
 from pipeline.tables.evaluate import Map
+from pipeline.tables.taylor import table as taylor
 
 _CENTRED, _RAISED, _CHEBYSHEV = _SERIES = "Taylor, centred", "Taylor, 0 to max", "Chebyshev"
 # [S14] 2.1: N that it found enough for the blazed grating, for Elaphe, and for all its surfaces
@@ -31,6 +44,73 @@ _SHOWN_ORDERS = (1, 3, 5, 7, 9)
 _CURVE_VIEWS = Map(41, MAP_RADIUS)
 # of exp(i k w h): the share that the default table.tolerance of 1e-4 leaves to the series
 _BOUND = 2e-5
+# of the window's transform: far below what any order here leaves
+_WINDOW_CUT = 1e-5
+
+
+@dataclass(frozen=True)
+class TaylorSeries:
+    """sum_(n <= N) (i k w h)^n / n! ([D14] eq. 6), heights from -H to H as the stack has them."""
+
+    surface: BenchSurface
+    stack: Stack
+
+    @classmethod
+    def centred(cls, surface: BenchSurface, order: int) -> "TaylorSeries":
+        """About the heights' mid-range, as this project has them, up to an order."""
+        return cls(surface, _stack(surface, "taylor", order))
+
+    def raised(self) -> "TaylorSeries":
+        """The same about the lowest height, heights from 0 to 2 H as scans come: twice the phase at the top.
+
+        ((h + H) / 2H)^n = 2^-n sum_j C(n, j) t^j, so every transform is a mean of those about mid-range.
+        """
+        n = np.arange(self.stack.terms)
+        mixing = comb(n[:, None], n) / 2.0 ** n[:, None]
+        coefficients = np.ascontiguousarray(self.stack.coefficients @ mixing.T)
+        half_range = 2.0 * self.stack.half_range_um
+        return replace(self, stack=replace(self.stack, coefficients=coefficients, half_range_um=half_range))
+
+    def xyz(self, order: int, wi: Array, wr: Array) -> Array:
+        """XYZ (directions, 3) of the terms up to `order`."""
+        config = self.surface.config
+        summed = taylor.at_directions(
+            _cut(self.stack, order), config.radiometry.integrand(PUBLISHED_STEP_NM), geometry.uvw(wi, wr)
+        )
+        factor = brdf.direction_factor(config.material, trapezoid(config.light, PUBLISHED_STEP_NM), wi, wr)
+        return np.asarray(factor[:, None] * summed)
+
+
+@dataclass(frozen=True)
+class ChebyshevSeries:
+    """sum_(n <= N) (2 - [n = 0]) i^n J_n(k w H) T_n(h / H)."""
+
+    surface: BenchSurface
+    order: int
+
+    @cached_property
+    def _stack(self) -> Stack:
+        return _stack(self.surface, "chebyshev", self.order)
+
+    def xyz(self, order: int, wi: Array, wr: Array) -> Array:
+        """XYZ (directions, 3) of the terms up to `order`."""
+        config, rule = self.surface.config, trapezoid(self.surface.config.light, PUBLISHED_STEP_NM)
+        terms = upload(_cut(self._stack, order))
+        power = windowed_dft.exact_power(terms, geometry.uvw(wi, wr), 1e-3 * rule.lambda_nm)
+        return integrate(power, rule, config.material, config.coherence.sigma_um, wi, wr)
+
+
+def _stack(surface: BenchSurface, basis: Basis, order: int) -> Stack:
+    config = surface.config
+    reachable = 1e3 / config.light.lambda_min_nm
+    return dft_stack.build(surface.field, basis, order + 1, config.coherence.sigma_um, reachable, _WINDOW_CUT)
+
+
+def _cut(whole: Stack, order: int) -> Stack:
+    """The same without the terms above `order`; they stay as zeros, so that one kernel serves every order."""
+    coefficients = whole.coefficients.copy()
+    coefficients[..., order + 1 :] = 0.0
+    return replace(whole, coefficients=coefficients)
 
 
 @dataclass(frozen=True)
@@ -71,7 +151,7 @@ def make(bench: Bench, progress: Progress) -> Page:
         for n, xyz in sorted(studies[2].maps.items())
     }
     published = {"blazed": _PUBLISHED_BLAZED, "elaphe": _PUBLISHED_ELAPHE, "all": _PUBLISHED_ALL}
-    text = PageText("terms", shown=SHOWN_RU, strict=STRICT_RU, step_nm=STEP_NM, **published)
+    text = PageText("terms", shown=SHOWN_RU, strict=STRICT_RU, step_nm=PUBLISHED_STEP_NM, **published)
     return text.page(
         checks=[*_published(text, studies), *_orders(text, studies), *_asymmetry(text, modes)],
         tables=[
@@ -86,7 +166,7 @@ def make(bench: Bench, progress: Progress) -> Page:
 def _study(surface: BenchSurface, views: Map, progress: Progress) -> _Study:
     config, exact = surface.config, surface.reference(progress)
     wi, wr = maps.directions(_CURVE_VIEWS, maps.NORMAL)
-    truth = exact.xyz(config.light, config.material, wi, wr, STEP_NM) / surface.unit
+    truth = exact.xyz(config.light, config.material, wi, wr, PUBLISHED_STEP_NM) / surface.unit
     lit = maps.lit_views(truth)
 
     def errors(found: Array) -> tuple[float, float]:

@@ -19,7 +19,6 @@ PUBLISHED_ORDERS = 8
 # [G04] C: the width of the bumps; they peak at these y = 2 lambda - 1, lambda in um from 0.5 to 1
 _SHARPNESS = 4.0
 _PEAKS = np.array([0.75, 0.5, 0.25])  # red, green, blue
-_WHITE = (1.0, 1.0, 1.0)
 # 1/um; [G04] leaves it to the user. Of a spacing of 1 um the highlight falls to 1/e within 11 degrees of view
 DEFAULT_ROUGHNESS = 10.0
 
@@ -39,14 +38,10 @@ class Gems(Method):
         direction_deg: float = 0.0,
         orders: int = PUBLISHED_ORDERS,
         roughness: float = DEFAULT_ROUGHNESS,
-        highlight: tuple[float, float, float] = _WHITE,
-        shown_at_ru: float | None = None,
     ) -> None:
         """The spacing is the surface's strongest period unless given; bands follow each other along `direction_deg`.
 
-        direction_deg: from +x. roughness: r. highlight: linear sRGB of its peak. shown_at_ru: the exposure at which a
-        display shows the shader's own colours, by default that of [render]. Raises ConfigError where the surface has
-        no period.
+        direction_deg: from +x. roughness: r. Raises ConfigError where the surface has no period.
         """
         if spacing_um is None:
             found = dominant_periods(field, 2e3 / config.light.lambda_min_nm, 1)
@@ -56,9 +51,7 @@ class Gems(Method):
         turn = np.radians(direction_deg)
         self._tangent = np.array([np.cos(turn), np.sin(turn), 0.0])
         self.spacing_um, self._orders, self._roughness = spacing_um, orders, roughness
-        self._highlight = np.array(highlight)
-        exposure = config.render.exposure_ru if shown_at_ru is None else shown_at_ru
-        self._unit = config.radiometry.unit / exposure
+        self._unit = config.radiometry.unit / config.render.exposure_ru
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         return np.asarray(self._unit * self.rgb(wi, wr) @ SRGB_TO_XYZ.T)
@@ -68,7 +61,7 @@ class Gems(Method):
         half = wi + wr
         u = half @ self._tangent * self.spacing_um
         error = self._roughness * u / half[:, 2]
-        return np.asarray(self._diffracted(np.abs(u)) + np.exp(-(error**2))[:, None] * self._highlight)
+        return np.asarray(self._diffracted(np.abs(u)) + np.exp(-(error**2))[:, None])
 
     def _diffracted(self, u: Array) -> Array:
         """The rainbow's colours of the wavelengths u / n, in um, that all bands reflect in phase."""

@@ -83,12 +83,10 @@ class Nmm(Method):
         config: Config,
         *,
         white_radius: float | None = None,
-        terms: int | None = None,
         reach: Reach = FOUR_SIGMA,
     ) -> None:
         """`white_radius`: of the white circle in (u, v); None takes lambda_max over the patch's smaller side.
 
-        `terms`: T + 1 of alg. 1; None takes enough for 1e-6 of exp(i k w h).
         Raises ConfigError for a laser line, which leaves nothing to select, and DeviceError where no device works.
         """
         if config.light.is_line:
@@ -97,7 +95,7 @@ class Nmm(Method):
         self._config, self._size_um = config, field.size_um
         first_order = 1e-3 * config.light.range_nm[1] / min(field.size_um)
         self.white_radius = first_order if white_radius is None else white_radius
-        self._lookup = Lookup(field, config, terms, reach)
+        self._lookup = Lookup(field, config, None, reach)
         self.stored_bytes = self._lookup.stored_bytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:

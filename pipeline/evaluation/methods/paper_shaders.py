@@ -20,7 +20,7 @@ PUBLISHED_CUT = exp(-(4.0**2) / 2.0)
 # [D14] sec. 5: "up to 501 x 501" nodes 2 |t|^5 sign(t)
 PUBLISHED_RESOLUTION, PUBLISHED_POWER = 501, 5.0
 # of |P|^2: it gives heights like the paper's some of its 15 to 40 terms
-TOLERANCE = 1e-3
+_TOLERANCE = 1e-3
 
 
 class PaperReference(Monochromatic):
@@ -32,10 +32,10 @@ class PaperReference(Monochromatic):
 
     source = "[D14] sec. 5, reference shader"
 
-    def __init__(self, field: HeightField, config: Config, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, field: HeightField, config: Config) -> None:
         """Raises AccuracyError where heights are beyond Taylor terms in the shaders' single precision."""
         super().__init__(config)
-        self._field, self._stack = field, taylor_stack(field, config, tolerance)
+        self._field, self._stack = field, taylor_stack(field, config)
         self.terms, self.stored_bytes = self._stack.terms, self._stack.coefficients.nbytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
@@ -53,17 +53,10 @@ class PaperLookUp(Method):
 
     source = "[D14] sec. 5, look-up shader"
 
-    def __init__(
-        self,
-        field: HeightField,
-        config: Config,
-        resolution: int = PUBLISHED_RESOLUTION,
-        power: float = PUBLISHED_POWER,
-        tolerance: float = TOLERANCE,
-    ) -> None:
+    def __init__(self, field: HeightField, config: Config, resolution: int = PUBLISHED_RESOLUTION) -> None:
         """Raises AccuracyError where float32 tables would lose their digits, or not fit."""
         rule = config.radiometry.integrand(PUBLISHED_STEP_NM)
-        table = taylor.build(taylor_stack(field, config, tolerance), rule, resolution, power)
+        table = taylor.build(taylor_stack(field, config), rule, resolution, PUBLISHED_POWER)
         self.stored_bytes = table.values.nbytes
         self._look_up = table_evaluator(table, config.radiometry)
 
@@ -71,12 +64,12 @@ class PaperLookUp(Method):
         return self._look_up(wi, wr)
 
 
-def taylor_stack(field: HeightField, config: Config, tolerance: float) -> Stack:
-    """The DFT of every Taylor term that `tolerance` asks for, the window cut where the paper cuts it.
+def taylor_stack(field: HeightField, config: Config) -> Stack:
+    """The DFT of every Taylor term that the tolerance asks for, the window cut where the paper cuts it.
 
     Raises AccuracyError where no number of terms reaches the tolerance in single precision.
     """
     rule = trapezoid(config.light, PUBLISHED_STEP_NM)
-    order = expansion.plan_taylor(field, rule, tolerance).order
+    order = expansion.plan_taylor(field, rule, _TOLERANCE).order
     reachable = expansion.W_MAX / (1e-3 * config.light.lambda_min_nm)
     return dft_stack.build(field, "taylor", order + 1, config.coherence.sigma_um, reachable, PUBLISHED_CUT)

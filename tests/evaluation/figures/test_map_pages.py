@@ -8,10 +8,10 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
-from pipeline.evaluation.figures import map_physics, method_traits
+from pipeline.evaluation.figures import map_physics, methods_sheet
 from pipeline.evaluation.figures.maps import NORMAL, blazed_recipe, directions, lit_views, under_normal_light
 from pipeline.evaluation.figures.page import Bench, BenchSurface
-from pipeline.evaluation.figures.truncated_series import ChebyshevSeries, TaylorSeries
+from pipeline.evaluation.figures.terms import ChebyshevSeries, TaylorSeries
 from pipeline.evaluation.methods.catalogue import METHODS
 from pipeline.evaluation.methods.paper_shaders import PaperLookUp
 from pipeline.optics import brdf, geometry
@@ -141,19 +141,19 @@ def test_bands_and_their_contrast() -> None:
     views = Map(201, 0.98)
     y = views.views()[:, 1]
     primary = 1e-3 + np.exp(-((y / 0.02) ** 2))
-    assert method_traits.band_contrast(primary, views) == pytest.approx(0.0, abs=1e-9)
+    assert methods_sheet.band_contrast(primary, views) == pytest.approx(0.0, abs=1e-9)
     banded = primary + 1e-3 * np.exp(-(((y + 0.2) / 0.03) ** 2))
-    assert method_traits.band_contrast(banded, views) == pytest.approx(1.0, abs=0.02)
-    assert method_traits.lopsided(primary, views) < 1e-12
-    assert method_traits.lopsided(banded, views) == pytest.approx(1e-3 / 1.001, rel=0.02)
+    assert methods_sheet.band_contrast(banded, views) == pytest.approx(1.0, abs=0.02)
+    assert methods_sheet.lopsided(primary, views) < 1e-12
+    assert methods_sheet.lopsided(banded, views) == pytest.approx(1e-3 / 1.001, rel=0.02)
 
 
 def test_oscillation_is_that_of_a_known_ripple() -> None:
     x = np.linspace(0.3, 0.95, 1301)
     ripple = 1.0 + 0.2 * np.sin(2.0 * np.pi * x / 0.008)
-    profile = method_traits.Profile(x, {"ripple": ripple * np.exp(-x), "plain": np.exp(-x)})
-    assert method_traits.oscillation(profile, "ripple") == pytest.approx(0.2 / np.sqrt(2.0), rel=0.02)
-    assert method_traits.oscillation(profile, "plain") < 1e-3
+    profile = methods_sheet.Profile(x, {"ripple": ripple * np.exp(-x), "plain": np.exp(-x)})
+    assert methods_sheet.oscillation(profile, "ripple") == pytest.approx(0.2 / np.sqrt(2.0), rel=0.02)
+    assert methods_sheet.oscillation(profile, "plain") < 1e-3
 
 
 def test_black_views_are_not_lit() -> None:
