@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures import map_physics, maps
+from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures.maps import NORMAL, SHOWN_RU, STRICT_RU, XENOPELTIS_RHO, Light, on_elaphe
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageText, Picture
 from pipeline.evaluation.methods.catalogue import METHODS, OURS, PAPER
@@ -42,7 +42,7 @@ class _Shown:
 
     def sectors(self, views: Map, *rho: tuple[float, float]) -> tuple[float, float]:
         """Shares of the exact luminance along the horizontal and the vertical."""
-        return map_physics.sectors(self.exact[:, 1], views, self.light, *rho)
+        return maps.sectors(self.exact[:, 1], views, self.light, *rho)
 
     def row(self, views: Map) -> tuple[Cell, ...]:
         """Its row of the page's table."""
@@ -100,9 +100,9 @@ def _show(surface: BenchSurface, views: Map, lights: Sequence[Light], progress: 
 
 def _one_sided(text: PageText, bench: Bench, blazed: _Shown, views: Map) -> Check:
     config, recipe, wr = blazed.surface.config, maps.blazed_recipe(bench), views.views()
-    sides = map_physics.first_orders(wr, recipe, config.light.range_nm)
+    sides = maps.first_orders(wr, recipe, config.light.range_nm)
     left, right = (float(blazed.exact[side, 1].sum()) for side in sides)
-    closed_left, closed_right = (map_physics.blazed_luminance(config, recipe, wr[side]).sum() for side in sides)
+    closed_left, closed_right = (maps.blazed_luminance(config, recipe, wr[side]).sum() for side in sides)
     closed = closed_left / closed_right
     return text.check("blazed.luminance", left / right, bound=closed, tolerance=_BLAZE_WITHIN * closed)
 
@@ -111,7 +111,7 @@ def _displacement(disc: BenchSurface, progress: Progress) -> float:
     """The largest distance of an order of the tracks from its place, in sigma_f lambda."""
     exact, away = disc.reference(progress), 0.0
     for nm in _DISC_LINES_NM:
-        expected, found = map_physics.order_sines(exact, disc.sigma_um, _DISC.track_um, nm, _DISC_ORDERS)
+        expected, found = maps.order_sines(exact, disc.sigma_um, _DISC.track_um, nm, _DISC_ORDERS)
         away = max(away, float(np.max(np.abs(found - expected))) / (1e-3 * nm * sigma_f(disc.sigma_um)))
     return away
 
@@ -120,7 +120,7 @@ def _sectors(text: PageText, elaphe: _Shown, xenopeltis: Sequence[_Shown], views
     normal = xenopeltis[0]
     (along, off), (across, fingers) = elaphe.sectors(views), normal.sectors(views, XENOPELTIS_RHO)
     growth = np.diff([each.sectors(views)[0] for each in xenopeltis])
-    below = map_physics.below_over_above(normal.exact[:, 1], views, normal.light, XENOPELTIS_RHO)
+    below = maps.below_over_above(normal.exact[:, 1], views, normal.light, XENOPELTIS_RHO)
     return [
         text.check("elaphe.horizontal", along / off),
         text.check("xenopeltis.vertical", fingers / across),

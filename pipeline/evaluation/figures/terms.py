@@ -20,7 +20,7 @@ from pipeline.diffraction.dft_stack import Basis, Stack
 from pipeline.diffraction.reference import integrate
 from pipeline.diffraction.upload import upload
 from pipeline.evaluation.check import Check
-from pipeline.evaluation.figures import map_physics, maps
+from pipeline.evaluation.figures import maps
 from pipeline.evaluation.figures.maps import NOTICEABLE, SHOWN_RU, STRICT_RU
 from pipeline.evaluation.figures.page import Bench, BenchSurface, Cell, Page, PageTable, PageText, Picture, numbers
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM
@@ -147,7 +147,7 @@ def make(bench: Bench, progress: Progress) -> Page:
     studies = [_study(surface, views, progress) for surface in (bench.blazed, bench.elaphe, bench.xenopeltis)]
     # luminance of Xenopeltis' first vertical mode below the centre over that above, by N
     modes = {
-        n: map_physics.below_over_above(xyz[:, 1], views, maps.NORMAL, maps.XENOPELTIS_RHO)
+        n: maps.below_over_above(xyz[:, 1], views, maps.NORMAL, maps.XENOPELTIS_RHO)
         for n, xyz in sorted(studies[2].maps.items())
     }
     published = {"blazed": _PUBLISHED_BLAZED, "elaphe": _PUBLISHED_ELAPHE, "all": _PUBLISHED_ALL}

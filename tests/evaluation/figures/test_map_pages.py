@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
-from pipeline.evaluation.figures import map_physics, methods_sheet
+from pipeline.evaluation.figures import maps, methods_sheet
 from pipeline.evaluation.figures.maps import NORMAL, blazed_recipe, directions, lit_views, under_normal_light
 from pipeline.evaluation.figures.page import Bench, BenchSurface
 from pipeline.evaluation.figures.terms import ChebyshevSeries, TaylorSeries
@@ -107,18 +107,18 @@ def test_the_blaze_is_the_reference_in_closed_form(bench: Bench) -> None:
     x = np.linspace(-0.6, 0.6, 61)
     wi, wr = under_normal_light(x)
     exact = bench.blazed.reference().xyz(config.light, config.material, wi, wr)[:, 1]
-    closed = map_physics.blazed_luminance(config, recipe, wr)
+    closed = maps.blazed_luminance(config, recipe, wr)
     assert np.max(np.abs(closed - exact)) < 5e-3 * np.max(exact)
 
 
 def test_orders_lie_where_the_grating_equation_has_them() -> None:
     grating = surface("sinusoid", period_um=2.5, axis="y")
     exact = Reference(grating.field, SIGMA_UM, 380.0)
-    expected, found = map_physics.order_sines(exact, SIGMA_UM, 2.5, 600.0, (-2, -1, 1, 2))
+    expected, found = maps.order_sines(exact, SIGMA_UM, 2.5, 600.0, (-2, -1, 1, 2))
     np.testing.assert_allclose(expected, [-0.48, -0.24, 0.24, 0.48])
     np.testing.assert_allclose(found, expected, atol=1e-3)
     # a wrong period is seen: the peak lies at the end of where it is looked for, or elsewhere
-    _, wrong = map_physics.order_sines(exact, SIGMA_UM, 2.6, 600.0, (1, 2))
+    _, wrong = maps.order_sines(exact, SIGMA_UM, 2.6, 600.0, (1, 2))
     assert np.all(np.abs(wrong - np.array([0.6, 1.2]) / 2.6) > 1e-3)
 
 
@@ -126,14 +126,14 @@ def test_sectors_and_sides() -> None:
     """An even map has the sectors' share of the ring; light below the centre has v > 0."""
     views = Map(201, 0.98)
     wr = views.views()
-    horizontal, vertical = map_physics.sectors(np.ones(len(wr)), views, NORMAL)
+    horizontal, vertical = maps.sectors(np.ones(len(wr)), views, NORMAL)
     assert horizontal == pytest.approx(0.25, abs=2e-3)
     assert vertical == pytest.approx(0.25, abs=2e-3)
     # sectors are seen from the mirror direction, which tilted light moves
     lit = np.where(np.abs(wr[:, 1]) < 0.05, 1.0, 0.0)
-    assert map_physics.sectors(lit, views, (20.0, 0.0))[0] == pytest.approx(1.0, abs=0.01)
+    assert maps.sectors(lit, views, (20.0, 0.0))[0] == pytest.approx(1.0, abs=0.01)
     below = np.where(wr[:, 1] < 0.0, 3.0, 1.0)
-    assert map_physics.below_over_above(below, views, NORMAL, (0.2, 0.5)) == pytest.approx(3.0)
+    assert maps.below_over_above(below, views, NORMAL, (0.2, 0.5)) == pytest.approx(3.0)
 
 
 def test_bands_and_their_contrast() -> None:
