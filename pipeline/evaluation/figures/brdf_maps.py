@@ -1,6 +1,6 @@
 """[D14] fig. 12 and 13, [S14] fig. 2.3 and 2.13: BRDF maps of every surface, exact and by this project's table."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,12 +71,7 @@ def make(bench: Bench, progress: Progress) -> Page:
         orders=_DISC_ORDERS,
     )
     return text.page(
-        checks=[
-            _one_sided(text, bench, blazed, views),
-            text.check("cd.tracks", _displacement(disc, progress)),
-            *_sectors(text, elaphe, xenopeltis, views),
-            *_budgets(text, shown, look_up),
-        ],
+        checks=_checks(text, bench, shown, look_up, views, progress),
         tables=[text.table("maps", [each.row(views) for each in (*shown, look_up)])],
         pictures=_pictures(text, views, shown, look_up),
     )
@@ -98,13 +93,30 @@ def _show(surface: BenchSurface, views: Map, lights: Sequence[Light], progress: 
     ]
 
 
-def _one_sided(text: PageText, bench: Bench, blazed: _Shown, views: Map) -> Check:
-    config, recipe, wr = blazed.surface.config, maps.blazed_recipe(bench), views.views()
+def _checks(
+    text: PageText, bench: Bench, shown: Sequence[_Shown], look_up: _Shown, views: Map, progress: Progress
+) -> Iterator[Check]:
+    blazed, disc, elaphe, *xenopeltis = shown
+    config, recipe, wr = bench.blazed.config, maps.blazed_recipe(bench), views.views()
     sides = maps.first_orders(wr, recipe, config.light.range_nm)
     left, right = (float(blazed.exact[side, 1].sum()) for side in sides)
     closed_left, closed_right = (maps.blazed_luminance(config, recipe, wr[side]).sum() for side in sides)
     closed = closed_left / closed_right
-    return text.check("blazed.luminance", left / right, bound=closed, tolerance=_BLAZE_WITHIN * closed)
+    yield text.check("blazed.luminance", left / right, bound=closed, tolerance=_BLAZE_WITHIN * closed)
+    yield text.check("cd.tracks", _displacement(disc.surface, progress))
+
+    normal = xenopeltis[0]
+    (along, off), (across, fingers) = elaphe.sectors(views), normal.sectors(views, XENOPELTIS_RHO)
+    growth = np.diff([each.sectors(views)[0] for each in xenopeltis])
+    below = maps.below_over_above(normal.exact[:, 1], views, normal.light, XENOPELTIS_RHO)
+    yield text.check("elaphe.horizontal", along / off)
+    yield text.check("xenopeltis.vertical", fingers / across)
+    yield text.check("xenopeltis.across", growth.min())
+    yield text.check("xenopeltis.below", below)
+
+    mean, budget = float(np.mean([each.error(STRICT_RU) for each in shown])), bench.elaphe.config.budget_delta_e
+    yield text.check("elaphe.table", elaphe.error(STRICT_RU), bound=look_up.error(STRICT_RU))
+    yield text.check("table.budget", mean, bound=budget)
 
 
 def _displacement(disc: BenchSurface, progress: Progress) -> float:
@@ -114,28 +126,6 @@ def _displacement(disc: BenchSurface, progress: Progress) -> float:
         expected, found = maps.order_sines(exact, disc.sigma_um, _DISC.track_um, nm, _DISC_ORDERS)
         away = max(away, float(np.max(np.abs(found - expected))) / (1e-3 * nm * sigma_f(disc.sigma_um)))
     return away
-
-
-def _sectors(text: PageText, elaphe: _Shown, xenopeltis: Sequence[_Shown], views: Map) -> list[Check]:
-    normal = xenopeltis[0]
-    (along, off), (across, fingers) = elaphe.sectors(views), normal.sectors(views, XENOPELTIS_RHO)
-    growth = np.diff([each.sectors(views)[0] for each in xenopeltis])
-    below = maps.below_over_above(normal.exact[:, 1], views, normal.light, XENOPELTIS_RHO)
-    return [
-        text.check("elaphe.horizontal", along / off),
-        text.check("xenopeltis.vertical", fingers / across),
-        text.check("xenopeltis.across", growth.min()),
-        text.check("xenopeltis.below", below),
-    ]
-
-
-def _budgets(text: PageText, shown: Sequence[_Shown], look_up: _Shown) -> list[Check]:
-    elaphe = next(each for each in shown if each.surface is look_up.surface)
-    mean, budget = float(np.mean([each.error(STRICT_RU) for each in shown])), elaphe.surface.config.budget_delta_e
-    return [
-        text.check("elaphe.table", elaphe.error(STRICT_RU), bound=look_up.error(STRICT_RU)),
-        text.check("table.budget", mean, bound=budget),
-    ]
 
 
 def _pictures(text: PageText, views: Map, shown: Sequence[_Shown], look_up: _Shown) -> list[Picture]:

@@ -56,10 +56,6 @@ class Row:
         along = 0.0 if self.axis == "x" else 0.5 * np.pi
         return Plane(THETA_I, along), Plane(THETA_I, along + np.pi)
 
-    def band(self, surface: BenchSurface) -> Band:
-        """Return the frequencies to search under a surface's window."""
-        return peaks.band_of(self.search_um, surface.sigma_um)
-
 
 ROWS = (
     Row("blazed", "Blazed grating", "blazed", "x", (2.0, 3.0), ((2500.34, 0.16),)),
@@ -115,7 +111,7 @@ class FirstOrder:
 
     @property
     def band(self) -> Band:
-        return self.row.band(self.surface)
+        return peaks.band_of(self.row.search_um, self.surface.sigma_um)
 
 
 class Powers:
@@ -145,7 +141,8 @@ class Powers:
 
 def first_order(row: Row, surface: BenchSurface, powers: Powers, lambda_nm: Array) -> FirstOrder:
     """Find a row's period on a surface with the light from both sides."""
-    cuts = [cut_of(powers.on(surface), plane, row, row.band(surface), lambda_nm) for plane in row.planes]
+    band = peaks.band_of(row.search_um, surface.sigma_um)
+    cuts = [cut_of(powers.on(surface), plane, row, band, lambda_nm) for plane in row.planes]
     return FirstOrder(row, surface, *sorted(cuts, key=lambda cut: -cut.brightness))
 
 

@@ -4,7 +4,7 @@ Their traits are numbers for what [S14] or [D14] says of its pictures: agreement
 fringes, bands.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,11 +130,11 @@ class _Sheet:
 
 
 def make(bench: Bench, progress: Progress) -> Page:
-    """Make the page: every method's map of three surfaces (quick: two) at normal incidence, and its"""
+    """Make the page: every method's map of three surfaces (quick: two) at normal incidence, and its traits."""
     views = maps.views_of(bench)
     surfaces = (bench.blazed, bench.elaphe, *(() if bench.quick else (bench.xenopeltis,)))
     sheets = [_sheet(bench, surface, views, progress) for surface in surfaces]
-    blazed, elaphe = sheets[:2]
+    elaphe = sheets[1]
     nmm = elaphe.methods[NMM]
     assert isinstance(nmm, Nmm)
     across = np.linspace(-1.0, 1.0, _CENTRE_SAMPLES) * _CENTRE_RADII * nmm.white_radius
@@ -148,15 +148,7 @@ def make(bench: Bench, progress: Progress) -> Page:
         radius=nmm.white_radius,
     )
     return text.page(
-        checks=[
-            *(_agreement(text, each) for each in sheets),
-            *_white(text, centre, nmm.white_radius),
-            *_fringes(text, fringes),
-            *_symmetry(text, "gems", GEMS, blazed, views),
-            _gaps(text, elaphe),
-            *_bands(text, elaphe, views),
-            *_symmetry(text, "gaussian", STAM, elaphe, views),
-        ],
+        checks=_checks(text, sheets, centre, fringes, nmm.white_radius, views),
         tables=[_table(text, sheets)],
         pictures=[
             *(_picture(text, views, each) for each in sheets),
@@ -178,42 +170,36 @@ def _sheet(bench: Bench, surface: BenchSurface, views: Map, progress: Progress) 
     return _Sheet(surface, methods, xyz, strip)
 
 
-def _agreement(text: PageText, sheet: _Sheet) -> Check:
-    """The worst error over max(exact, 1e-7 of a mirror) of FLSS with full reach at 1 nm, on random directions."""
-    surface, (wi, wr) = sheet.surface, random_pairs(None, _DIRECTIONS, _SEED)
-    truth = sheet.methods[EXACT].xyz(wi, wr)
-    found = Flss(surface.field, surface.config, reach=FULL, step_nm=STEP_NM).xyz(wi, wr)
-    worst = np.max(np.abs(found - truth) / np.maximum(truth, _DARK))
-    return text.check("flss.{surface}", worst, surface=surface.name)
-
-
-def _white(text: PageText, centre: Profile, radius: float) -> list[Check]:
+def _checks(
+    text: PageText, sheets: Sequence[_Sheet], centre: Profile, fringes: Profile, radius: float, views: Map
+) -> Iterator[Check]:
+    (wi, wr), (blazed, elaphe) = random_pairs(None, _DIRECTIONS, _SEED), sheets[:2]
+    for each in sheets:
+        surface, exact = each.surface, each.methods[EXACT].xyz(wi, wr)
+        found = Flss(surface.field, surface.config, reach=FULL, step_nm=STEP_NM).xyz(wi, wr)
+        worst = np.max(np.abs(found - exact) / np.maximum(exact, _DARK))
+        yield text.check("flss.{surface}", worst, surface=surface.name)
     inside = np.abs(centre.sin_theta) < 0.999 * radius
-    white, truth = centre.luminance[NMM][inside], centre.luminance[EXACT][inside]
-    return [text.check("nmm.white", np.max(np.abs(white - 1.0))), text.check("nmm.exact", truth.max())]
+    yield text.check("nmm.white", np.max(np.abs(centre.luminance[NMM][inside] - 1.0)))
+    yield text.check("nmm.exact", centre.luminance[EXACT][inside].max())
+    swing = {name: oscillation(fringes, name) for name in (EXACT, FLSS, PQ)}
+    yield text.check("pq.fringes", swing[PQ] / swing[EXACT])
+    yield text.check("flss.fringes", swing[FLSS] / swing[EXACT])
+    yield from _symmetry(text, "gems", GEMS, blazed, views)
+    bumps, lit = (lit_share(elaphe.surface, elaphe.methods[name]) for name in (BUMPS, EXACT))
+    yield text.check("bumps.gaps", bumps, bound=_LIT_AT_MOST * lit)
+    stam, exact_bands = (band_contrast(elaphe.luminance(name), views) for name in (STAM, EXACT))
+    bound = VISIBLE_CONTRAST if elaphe.surface.scan else None
+    yield text.check("gaussian.bands", stam, bound=bound)
+    yield text.check("exact.bands", exact_bands)
+    yield from _symmetry(text, "gaussian", STAM, elaphe, views)
 
 
-def _fringes(text: PageText, profile: Profile) -> list[Check]:
-    exact, flss, pq = (oscillation(profile, name) for name in (EXACT, FLSS, PQ))
-    return [text.check("pq.fringes", pq / exact), text.check("flss.fringes", flss / exact)]
-
-
-def _symmetry(text: PageText, key: str, name: str, sheet: _Sheet, views: Map) -> list[Check]:
+def _symmetry(text: PageText, key: str, name: str, sheet: _Sheet, views: Map) -> Iterator[Check]:
     """Of a method that is even by construction, and of the surface, which is not."""
     found, exact = (lopsided(sheet.luminance(each), views) for each in (name, EXACT))
-    surface = sheet.surface.name
-    return [text.check(f"{key}.even", found), text.check(f"{key}.exact", exact, surface=surface)]
-
-
-def _gaps(text: PageText, elaphe: _Sheet) -> Check:
-    bumps, exact = (lit_share(elaphe.surface, elaphe.methods[name]) for name in (BUMPS, EXACT))
-    return text.check("bumps.gaps", bumps, bound=_LIT_AT_MOST * exact)
-
-
-def _bands(text: PageText, elaphe: _Sheet, views: Map) -> list[Check]:
-    stam, exact = (band_contrast(elaphe.luminance(name), views) for name in (STAM, EXACT))
-    bound = VISIBLE_CONTRAST if elaphe.surface.scan else None
-    return [text.check("gaussian.bands", stam, bound=bound), text.check("exact.bands", exact)]
+    yield text.check(f"{key}.even", found)
+    yield text.check(f"{key}.exact", exact, surface=sheet.surface.name)
 
 
 def _table(text: PageText, sheets: Sequence[_Sheet]) -> PageTable:

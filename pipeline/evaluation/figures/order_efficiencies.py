@@ -168,19 +168,6 @@ class Answers:
     polar: Array
     polar_of_a_line: Array
 
-    def differences(self) -> dict[str, tuple[Array, dict[str, float]]]:
-        """Return, by the check's name: the difference from a closed form (n,), and what its words and bound need."""
-        return {
-            "direct": (self.direct - self.samples, {}),
-            "reference": (self.reference - self.samples, {}),
-            "reference.profile": (self.reference - self.profile, {"bound": TOLERANCE}),
-            "polar": (self.polar - self.profile, {"bound": TOLERANCE, "spacing": FINE_SPACING}),
-            "polar.line": (
-                self.polar_of_a_line - self.samples,
-                {"bound": between_radii(_LINE_SPACING), "spacing": _LINE_SPACING},
-            ),
-        }
-
 
 def answers(grating: KnownGrating, sigma_um: float, at: Orders) -> Answers:
     """Compute a grating's orders by every algorithm."""
@@ -238,8 +225,16 @@ def make(bench: Bench, progress: Progress) -> Page:
 def checks_of(grating: KnownGrating, found: Answers) -> Iterator[Check]:
     """Return the checks of one grating: the largest difference of each algorithm from its closed form."""
     text = PageText("order_efficiencies", key=grating.key, grating=grating.name)
-    for name, (difference, known) in found.differences().items():
-        yield text.check(f"{{key}}.{name}", np.max(np.abs(difference)), **known)
+
+    def check(name: str, difference: Array, **known: float) -> Check:
+        return text.check(f"{{key}}.{name}", np.max(np.abs(difference)), **known)
+
+    yield check("direct", found.direct - found.samples)
+    yield check("reference", found.reference - found.samples)
+    yield check("reference.profile", found.reference - found.profile, bound=TOLERANCE)
+    yield check("polar", found.polar - found.profile, bound=TOLERANCE, spacing=FINE_SPACING)
+    bound = between_radii(_LINE_SPACING)
+    yield check("polar.line", found.polar_of_a_line - found.samples, bound=bound, spacing=_LINE_SPACING)
 
 
 def _table(text: PageText, found: dict[str, Answers], at: Orders) -> PageTable:

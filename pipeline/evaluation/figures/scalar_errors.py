@@ -94,15 +94,6 @@ class Efficiencies:
         return self.scalar - self.rigorous
 
 
-def rigorous(case: GratingCase, depths: Array) -> Array:
-    """Return TE and TM (2, depths) over the flat surface's reflectance of unpolarised light."""
-    index, theta = INDICES[case.material], float(np.radians(case.theta_deg))
-    shape = SHAPES[case.shape]
-    grating = coupled_wave.RigorousGrating(shape.profile, case.period, theta, index)
-    found = coupled_wave.both_polarisations(grating, depths, shape.columns, _ORDER)
-    return np.asarray(found / fresnel.reflectance(np.cos(theta), index))
-
-
 def scalar(case: GratingCase, depths: Array) -> tuple[Array, Array]:
     """Return R(half angle) |c_1|^2 G / w^2 over R(ti), the BRDF of the order's lobe, and |c_1|^2, (depths,) each."""
     wi = case.wi
@@ -115,7 +106,10 @@ def scalar(case: GratingCase, depths: Array) -> tuple[Array, Array]:
 
 def solve(case: GratingCase, depths: Array) -> Efficiencies:
     """Solve one case, rigorously and by the scalar model."""
-    te, tm = rigorous(case, depths)
+    index, theta, shape = INDICES[case.material], float(np.radians(case.theta_deg)), SHAPES[case.shape]
+    grating = coupled_wave.RigorousGrating(shape.profile, case.period, theta, index)
+    found = coupled_wave.both_polarisations(grating, depths, shape.columns, _ORDER)
+    te, tm = found / fresnel.reflectance(np.cos(theta), index)
     return Efficiencies(te, tm, *scalar(case, depths))
 
 

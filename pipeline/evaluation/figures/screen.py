@@ -171,12 +171,7 @@ def make(bench: Bench, progress: Progress) -> Page:
     )
     compared = {"errors": errors, "averaged": averaged, **({"nearer": nearer} if nearer else {})}
     return text.page(
-        checks=[
-            *_error_checks(text, errors),
-            *_nearer_checks(text, nearer),
-            text.check("benchmark", worst),
-            *_band_checks(text, bands, surface),
-        ],
+        checks=_checks(text, errors, nearer, worst, bands, surface),
         tables=[
             *(text.table(key, _error_rows(each)) for key, each in compared.items()),
             text.table("tails", _tail_rows(errors)),
@@ -230,20 +225,17 @@ def _times_below(errors: _Errors, name: str, ru: float) -> float:
     return _mean(errors, PAPER, ru) / _mean(errors, name, ru)
 
 
-def _error_checks(text: PageText, errors: _Errors) -> Iterator[Check]:
+def _checks(
+    text: PageText, errors: _Errors, nearer: _Errors, worst: float, bands: Mapping[str, Bands], surface: BenchSurface
+) -> Iterator[Check]:
     for ru in EXPOSURES_RU:
         yield text.check("paper_over_ours.{ru:g}", _times_below(errors, OURS, ru), bound=_BETTER, ru=ru)
         for key, name in (("paper", PAPER), ("stam", STAM)):
             known = {"method": _NAMES[name], "ru": ru, "bound": PUBLISHED[name][ru]}
             yield text.check(f"{key}.{{ru:g}}", _mean(errors, name, ru), **known)
-
-
-def _nearer_checks(text: PageText, errors: _Errors) -> Iterator[Check]:
-    for ru in EXPOSURES_RU if errors else ():
-        yield text.check("nearer.paper_over_ours.{ru:g}", _times_below(errors, OURS, ru), ru=ru)
-
-
-def _band_checks(text: PageText, bands: Mapping[str, Bands], surface: BenchSurface) -> Iterator[Check]:
+    for ru in EXPOSURES_RU if nearer else ():
+        yield text.check("nearer.paper_over_ours.{ru:g}", _times_below(nearer, OURS, ru), ru=ru)
+    yield text.check("benchmark", worst)
     # a recipe's fingers have a firm period along their length, which the correlation knows as well
     visible = VISIBLE_CONTRAST if surface.scan else None
     for key, name in (("bands.gaussian", STAM), ("bands.disc", STAM_DISC)):

@@ -153,7 +153,7 @@ def make(bench: Bench, progress: Progress) -> Page:
     published = {"blazed": _PUBLISHED_BLAZED, "elaphe": _PUBLISHED_ELAPHE, "all": _PUBLISHED_ALL}
     text = PageText("terms", shown=SHOWN_RU, strict=STRICT_RU, step_nm=PUBLISHED_STEP_NM, **published)
     return text.page(
-        checks=[*_published(text, studies), *_orders(text, studies), *_asymmetry(text, modes)],
+        checks=_checks(text, studies, modes),
         tables=[
             text.table("orders", map(_Study.orders, studies), numbers("{:g}", *_SERIES)),
             _errors_table(text, studies),
@@ -188,7 +188,7 @@ def _study(surface: BenchSurface, views: Map, progress: Progress) -> _Study:
     return _Study(surface, found, shown, bound, bound_raised)
 
 
-def _published(text: PageText, studies: Sequence[_Study]) -> Iterator[Check]:
+def _checks(text: PageText, studies: Sequence[_Study], modes: dict[int, float]) -> Iterator[Check]:
     for key, study, order in zip(("blazed", "elaphe"), studies, _PUBLISHED, strict=False):
         known = {"key": key, "surface": study.surface.name, "n": order}
         centred, raised = (study.errors[series][order][0] for series in (_CENTRED, _RAISED))
@@ -197,18 +197,11 @@ def _published(text: PageText, studies: Sequence[_Study]) -> Iterator[Check]:
         yield text.check("{key}.enough", study.enough(_CENTRED, 0), bound=order, **known)
     worst = max(study.errors[_RAISED][_PUBLISHED_ALL][1] for study in studies)
     yield text.check("all.raised", worst, bound=NOTICEABLE)
-
-
-def _orders(text: PageText, studies: Sequence[_Study]) -> Iterator[Check]:
-    """The order that our bound chooses, and the orders that the series need at the higher exposure."""
     needed = [[study.enough(name, 1) for name in _SERIES] for study in studies]
     # orders that were not reached are infinite, and their ratio, NaN, passes no bound
     yield text.check("all.bound", max(study.left_by_bound for study in studies))
     yield text.check("all.chebyshev", np.max([chebyshev / centred for centred, _, chebyshev in needed]))
     yield text.check("all.centring", np.max([centred / raised for centred, raised, _ in needed]))
-
-
-def _asymmetry(text: PageText, modes: dict[int, float]) -> Iterator[Check]:
     first, *_, converged = modes.values()
     yield text.check("modes.first", abs(first - 1.0))
     yield text.check("modes.converged", converged, n=max(modes))
