@@ -93,6 +93,11 @@ class Efficiencies:
         """Ours minus the rigorous one, of unpolarised light."""
         return self.scalar - self.rigorous
 
+    @property
+    def bare_error(self) -> Array:
+        """|c_1|^2 alone minus the rigorous one."""
+        return self.bare - self.rigorous
+
 
 def scalar(case: GratingCase, depths: Array) -> tuple[Array, Array]:
     """Return R(half angle) |c_1|^2 G / w^2 over R(ti), the BRDF of the order's lobe, and |c_1|^2, (depths,) each."""
@@ -157,8 +162,8 @@ class Sweep:
         cases = [GratingCase(shape, material, theta_deg, period) for period in self.periods]
         return np.stack([getattr(self.results[case], what) for case in cases], axis=1)
 
-    def by_class(self, shape: str, what: Callable[[Efficiencies], Array]) -> Array:
-        """Return the largest magnitude over materials and lights, in the shape of the quoted table.
+    def by_class(self, shape: str, what: str) -> Array:
+        """Return the largest magnitude of an error over materials and lights, in the shape of the quoted table.
 
         It is that of periods from each of the table's on, and of depths up to each of them.
         """
@@ -168,7 +173,7 @@ class Sweep:
                 [
                     max(
                         (
-                            np.max(np.abs(what(each))[depths <= depth], initial=0.0)
+                            np.max(np.abs(getattr(each, what))[depths <= depth], initial=0.0)
                             for case, each in self.results.items()
                             if case.shape == shape and case.period >= period
                         ),

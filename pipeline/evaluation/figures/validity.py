@@ -1,12 +1,11 @@
 """The domain of the scalar model: first orders of gratings against a rigorous coupled-wave solver."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
 
 from pipeline.accuracy import scalar_domain
-from pipeline.arrays import Array
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures import coupled_wave
 from pipeline.evaluation.figures.page import Bench, Page, PageTable, PageText, Picture, numbers
@@ -15,7 +14,6 @@ from pipeline.evaluation.figures.scalar_errors import (
     INDICES,
     METAL,
     SHAPES,
-    Efficiencies,
     GratingCase,
     Sweep,
     scalar,
@@ -85,10 +83,6 @@ def make(bench: Bench, progress: Progress) -> Page:
     )
 
 
-def _error(each: Efficiencies) -> Array:
-    return each.error
-
-
 def _published_checks() -> Iterator[Check]:
     """The solver on a published case."""
     for polarisation, (order, value) in _PUBLISHED.items():
@@ -115,7 +109,7 @@ def _integral_checks(found: Sweep) -> Iterator[Check]:
 def domain_checks(found: Sweep, whole: bool) -> Iterator[Check]:
     """The quoted table against this measurement: not below it and, of the whole grid, not far above."""
     for name, shape in SHAPES.items():
-        measured = found.by_class(name, _error)
+        measured = found.by_class(name, "error")
         for period, quoted, errors in zip(scalar_domain.PERIODS, shape.quoted, measured, strict=True):
             above, known = errors - np.array(quoted), {"shape": name, "period": period}
             yield _TEXT.check("{shape}.{period:g}", above.max(), **known)
@@ -134,15 +128,12 @@ def _quoted_table() -> PageTable:
 
 def _measured_table(found: Sweep) -> PageTable:
     """The effect of G / w^2: the largest errors with and without it."""
-    models: dict[str, Callable[[Efficiencies], Array]] = {
-        "|c_1|² G / w²": _error,
-        "|c_1|² alone": lambda each: each.bare - each.rigorous,
-    }
+    models = {"|c_1|² G / w²": "error", "|c_1|² alone": "bare_error"}
     rows = [
         (name, model, period, *row)
         for name in SHAPES
-        for model, error in models.items()
-        for period, row in zip(scalar_domain.PERIODS, found.by_class(name, error), strict=True)
+        for model, what in models.items()
+        for period, row in zip(scalar_domain.PERIODS, found.by_class(name, what), strict=True)
     ]
     return _TEXT.table("measured", rows, numbers("{:.3f}", *_DEPTH_COLUMNS))
 
