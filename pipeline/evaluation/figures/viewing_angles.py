@@ -70,13 +70,7 @@ def make(bench: Bench, progress: Progress) -> Page:
     snakes, blaze = found[1:], blaze_of(found[0], powers, lambda_nm)
     return _TEXT.page(
         checks=[*_blaze_checks(blaze), *snake_checks(snakes, moved)],
-        tables=[
-            _TEXT.table("periods", _period_rows(found)),
-            _blaze_table(blaze),
-            _shaders_table(found, shaders),
-            _variants_table(snakes, settings),
-            _positions_table(moved),
-        ],
+        tables=list(_tables(found, shaders, settings, blaze, moved)),
         pictures=_pictures(found, powers, moved, lambda_nm, views),
         remarks=[*_blaze_remarks(found[0], blaze), _TEXT.remark("speckle"), *_snake_remarks(snakes, settings)],
     )
@@ -104,52 +98,43 @@ def snake_checks(snakes: Sequence[FirstOrder], moved: Sequence[ByPosition]) -> I
                 yield _TEXT.check("{row.key}.windows{i}", shorter, row=each.row, i=i, published=published)
 
 
-def _period_rows(found: Sequence[FirstOrder]) -> Iterator[tuple[Cell, ...]]:
+def _tables(
+    found: Sequence[FirstOrder],
+    shaders: Sequence[_Variants],
+    settings: Sequence[_Variants],
+    blaze: _Variants,
+    moved: Sequence[ByPosition],
+) -> Iterator[PageTable]:
+    rows: list[tuple[Cell, ...]] = []
     for each in found:
+        azimuth = float(np.degrees(each.cut.plane.azimuth))
         for i, ((raw, line), printed) in enumerate(zip(each.cut.lines, each.row.published, strict=True)):
-            brightest = each.cut.brightest.spread if i == 0 else None
-            apart = 100.0 * (line.mean / printed[0] - 1.0)
-            yield (
-                each.row.label,
-                np.degrees(each.cut.plane.azimuth),
-                printed,
-                brightest,
-                raw.spread,
-                line.spread,
-                apart,
-            )
+            brightest, apart = each.cut.brightest.spread if i == 0 else None, 100.0 * (line.mean / printed[0] - 1.0)
+            rows.append((each.row.label, azimuth, printed, brightest, raw.spread, line.spread, apart))
+    yield _TEXT.table("periods", rows)
 
+    names = _TEXT.words["tables"]["blazed"]
+    rows = [(_TEXT.fill(names[key]), *of.spread, of.mean - _TRUE_NM) for key, of in blaze.items()]
+    yield _TEXT.table("blazed", rows)
 
-def _blaze_table(blaze: _Variants) -> PageTable:
-    names, rows = _TEXT.words["tables"]["blazed"], blaze.items()
-    return _TEXT.table(
-        "blazed", [(_TEXT.fill(names[key]), *found.spread, found.mean - _TRUE_NM) for key, found in rows]
-    )
-
-
-def _shaders_table(found: Sequence[FirstOrder], shaders: Sequence[_Variants]) -> PageTable:
-    rows: list[tuple[Cell, ...]] = [
+    rows = [
         (each.row.label, each.cut.brightest.spread, *(periods.spread for periods in of.values()))
         for each, of in zip(found, shaders, strict=True)
     ]
-    return _TEXT.table("methods", rows, numbers(_SPREAD, *shaders[0]))
+    yield _TEXT.table("methods", rows, numbers(_SPREAD, *shaders[0]))
 
+    snakes = [each.row for each in found[1:]]
+    rows = [("published", *(", ".join(_SPREAD.format(*each) for each in snake.published) for snake in snakes))]
+    for name in dict.fromkeys(name for of in settings for name in of):
+        rows.append((name, *(of[name].spread if name in of else None for of in settings)))
+    yield _TEXT.table("settings", rows, numbers(_SPREAD, *(snake.label for snake in snakes)))
 
-def _variants_table(snakes: Sequence[FirstOrder], settings: Sequence[_Variants]) -> PageTable:
-    names = list(dict.fromkeys(name for of in settings for name in of))
-    printed = [", ".join(_SPREAD.format(*each) for each in snake.row.published) for snake in snakes]
-    rows: list[tuple[Cell, ...]] = [("published", *printed)]
-    rows += [(name, *(of[name].spread if name in of else None for of in settings)) for name in names]
-    return _TEXT.table("settings", rows, numbers(_SPREAD, *(snake.row.label for snake in snakes)))
-
-
-def _positions_table(moved: Sequence[ByPosition]) -> PageTable:
-    def row(each: ByPosition, mean: float) -> tuple[Cell, ...]:
-        near = float(np.mean(np.abs(each.periods / mean - 1.0) <= _NEAR))
-        return each.row.label, mean, each.quantiles(0.1), each.quantiles(_RARE), near, tuple(each.mean)
-
-    rows = [row(each, mean) for each in moved for mean, _ in each.row.published]
-    return _TEXT.table("positions", rows, count=len(moved[0].periods))
+    rows = []
+    for by in moved:
+        for mean, _ in by.row.published:
+            near = float(np.mean(np.abs(by.periods / mean - 1.0) <= _NEAR))
+            rows.append((by.row.label, mean, by.quantiles(0.1), by.quantiles(_RARE), near, tuple(by.mean)))
+    yield _TEXT.table("positions", rows, count=len(moved[0].periods))
 
 
 def _pictures(
