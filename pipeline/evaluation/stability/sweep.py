@@ -1,6 +1,6 @@
 """A test case, and the families of cases: heights, pitches, sizes, shapes, windows, surfaces, tables."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -88,11 +88,19 @@ TAYLOR_FAILS_UM, TALLEST_UM = 2.0, 10.0
 _SERIES_HEIGHTS_UM = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 7.0, 10.0)
 # heights that Taylor tables of 1e-4 take, and one that they must refuse
 _TAYLOR_HEIGHTS_UM = (1e-3, 0.1, 0.3, 0.5, 2.0)
+# samples (ny, nx) and pitches of patches that are not square
+_OBLONG = (
+    ((65, 33), (0.1, 0.2)),
+    ((64, 256), (0.1, 0.1)),
+    ((200, 72), (0.05, 0.13)),
+    ((128, 128), (0.02, 0.2)),
+)
+_KINDS: tuple[Kind, ...] = ("flat", "spike", "steps", "hills", "noise")
 
 
 def cases(quick: bool = False) -> list[StressCase]:
     """Return the sweep, or a part of it that takes seconds."""
-    return [case for family in _FAMILIES for case in family(quick)]
+    return [*_by_height(quick), *_by_geometry(quick), *_by_table(quick)]
 
 
 def tall() -> list[StressCase]:
@@ -121,39 +129,19 @@ def _on_device(case: StressCase, with_taylor: bool = True) -> Iterator[StressCas
         yield replace(case, basis="taylor", height_um=min(case.height_um, 0.1))
 
 
-def _by_pitch(quick: bool) -> Iterator[StressCase]:
+def _by_geometry(quick: bool) -> Iterator[StressCase]:
     for pitch in (0.005, 0.2) if quick else (0.005, 0.01, 0.02, 0.05, 0.2):
         sigma = 0.25 * _BASE.shape[1] * pitch
         yield from _on_device(replace(_BASE, family="pitch", pitch_um=(pitch, pitch), sigma_um=sigma))
-
-
-def _by_size(quick: bool) -> Iterator[StressCase]:
     for n in (64, 512) if quick else (64, 256, 1024, 4096):
-        yield from _on_device(
-            replace(_BASE, family="size", shape=(n, n), pitch_um=(0.02, 0.02), sigma_um=0.005 * n), n <= 1024
-        )
-
-
-def _by_shape(quick: bool) -> Iterator[StressCase]:
-    oblong: Iterable[tuple[tuple[int, int], tuple[float, float]]] = (
-        ((65, 33), (0.1, 0.2)),
-        ((64, 256), (0.1, 0.1)),
-        ((200, 72), (0.05, 0.13)),
-        ((128, 128), (0.02, 0.2)),
-    )
-    for shape, pitch in list(oblong)[:1] if quick else oblong:
-        yield from _on_device(replace(_BASE, family="shape", shape=shape, pitch_um=pitch, sigma_um=1.5))
-
-
-def _by_window(quick: bool) -> Iterator[StressCase]:
-    """From one pixel, which must be refused, over two to twice the patch's width."""
+        square = replace(_BASE, family="size", shape=(n, n), pitch_um=(0.02, 0.02), sigma_um=0.005 * n)
+        yield from _on_device(square, n <= 1024)
+    for shape, pitches in _OBLONG[:1] if quick else _OBLONG:
+        yield from _on_device(replace(_BASE, family="shape", shape=shape, pitch_um=pitches, sigma_um=1.5))
+    # from one pixel, which must be refused, over two to twice the patch's width
     for sigma in (0.1, 0.2, 12.8) if quick else (0.1, 0.2, 0.4, 6.4, 12.8, 25.6):
         yield from _on_device(replace(_BASE, family="window", sigma_um=sigma))
-
-
-def _by_surface(quick: bool) -> Iterator[StressCase]:
-    kinds: tuple[Kind, ...] = ("flat", "spike", "steps") if quick else ("flat", "spike", "steps", "hills", "noise")
-    for kind in kinds:
+    for kind in _KINDS[:3] if quick else _KINDS:
         for height in (10.0,) if quick else (0.1, 2.0, 10.0):
             yield from _on_device(replace(_BASE, family="surface", kind=kind, height_um=height), height == 0.1)
 
@@ -173,6 +161,3 @@ def _by_table(quick: bool) -> Iterator[StressCase]:
     yield replace(base, shape=(128, 128), pitch_um=(0.2, 0.2), sigma_um=6.4)
     yield replace(base, sigma_um=0.8)
     yield replace(base, sigma_um=6.4)
-
-
-_FAMILIES = (_by_height, _by_pitch, _by_size, _by_shape, _by_window, _by_surface, _by_table)
