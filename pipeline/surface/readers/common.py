@@ -6,7 +6,7 @@ import warnings
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from pipeline.errors import InputError
 
@@ -94,6 +94,17 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         raise fault(file, expected, f"content that {library} cannot read ({cause})", _way_out(error)) from None
 
 
+@contextmanager
+def replaced(owner: Any, name: str, value: object) -> Iterator[None]:
+    """Gives an attribute of a library's module or class another value for a while."""
+    former = getattr(owner, name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, former)
+
+
 def _way_out(error: Exception) -> str:
     """Returns the remedy; a file is called damaged only where the error is one of missing bytes."""
     named_so = type(error).__name__ in ("CorruptFile", "BadZipFile", "IncompleteRead")
@@ -104,6 +115,8 @@ def _way_out(error: Exception) -> str:
 
 def library_version(library: str) -> str:
     """Returns the name of a library with its version."""
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return f"{library} {version(library)}"
     except PackageNotFoundError:

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from pipeline.surface.readers.common import (
     library_version,
     micrometres,
     pick_channel,
+    replaced,
     third_party,
 )
 from pipeline.surface.scan import Scan
@@ -30,8 +30,8 @@ def read(path: Path, channel: str | None) -> Scan:
 
         # it takes the kind of a file from the suffix
         with (
-            patch.object(nanonis, "_is_valid_file", lambda _, ext: ext),
-            patch.object(nanonis.Scan, "_determine_filetype", lambda _: "scan"),
+            replaced(nanonis, "_is_valid_file", lambda _, ext: ext),
+            replaced(nanonis.Scan, "_determine_filetype", lambda _: "scan"),
         ):
             stored = nanonis.Scan(str(path))
         units = dict(zip(stored.header["data_info"]["Name"], stored.header["data_info"]["Unit"], strict=True))
