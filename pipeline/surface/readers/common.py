@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from pipeline.errors import InputError
+from pipeline.errors import BakeError, InputError
 
 MIN_SAMPLES = 8
 MAX_SAMPLES = 8192
@@ -79,7 +79,7 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except (InputError, MemoryError):
+    except (BakeError, MemoryError):
         raise
     except ImportError as error:
         missing = error.name or library
@@ -126,7 +126,7 @@ def library_version(library: str) -> str:
 def check_shape(file: str, shape: Sequence[int]) -> None:
     """Requires a shape (ny, nx) with MIN_SAMPLES..MAX_SAMPLES along both axes; else raises InputError.
 
-    Readers call it before they decode, so that a wrong size in a header allocates no memory.
+    Readers call `room.make_room`, which calls it, before they decode: a wrong size in a header allocates no memory.
     """
     in_words = " x ".join(str(n) for n in shape) or "one number"
     if len(shape) != 2:

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import (
-    check_shape,
     fault,
     library_version,
     micrometres,
@@ -15,6 +14,7 @@ from pipeline.surface.readers.common import (
     replaced,
     third_party,
 )
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _BACKWARD = " backward"
@@ -49,7 +49,7 @@ def _heights(path: Path, stored: Any, name: str) -> NDArray[np.float64]:
     """Turns a channel so that x grows to the right and y upwards; the file has samples in the order of scanning."""
     direction = "backward" if name.endswith(_BACKWARD) else "forward"
     lines = np.array(stored.signals[name.removesuffix(_BACKWARD)][direction], dtype=np.float64)
-    check_shape(path.name, lines.shape)
+    make_room(path.name, lines.shape)
     if direction == "backward":
         # backward scans begin at the right
         lines = lines[:, ::-1]

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from pipeline.surface.readers import igor, nanoscope
 from pipeline.surface.readers.common import (
     EXPORT,
-    check_shape,
     fault,
     library_version,
     micrometres,
@@ -30,6 +29,7 @@ from pipeline.surface.readers.common import (
     unique_names,
 )
 from pipeline.surface.readers.formats import BY_LIBRARY, LIBRARY
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _LIBRARY = LIBRARY
@@ -69,7 +69,7 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
         wanted = names[plain.index(channel)] if channel in plain else channel
         index = pick_channel(path.name, names, wanted)
         chosen, _, unit = candidates[index]
-        check_shape(path.name, chosen.nb_grid_pts[::-1])
+        make_room(path.name, chosen.nb_grid_pts[::-1])
         sizes = {} if chosen.physical_sizes is not None else {"physical_sizes": chosen.nb_grid_pts}
         stored = chosen.topography(**sizes).heights()
         heights = _heights(stored, key)
