@@ -119,6 +119,6 @@ def _scan(path: Path, channel: str | None) -> dict[str, Any]:
         "mask covers": measured.masked_share,
         "lowest": float(valid.min()) if valid.size else None,
         "highest": float(valid.max()) if valid.size else None,
-        "warnings": [*measured.warnings, *refusals(path.name, scan, measured)],
+        "warnings": [*scan.warnings, *measured.warnings, *refusals(path.name, scan, measured)],
         "config needs": [key for key, needed in needs.items() if needed],
     }

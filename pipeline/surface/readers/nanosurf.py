@@ -101,8 +101,9 @@ def _data_sets(path: Path, data: bytes) -> list[_DataSet]:
     content = sections.get("DataSet", {})
     found = []
     with _valid_entries(path):
-        for group in range(int(content["GroupCount"])):
-            for number in range(int(content[f"Gr{group}-Count"])):
+        # no more sets than entries, whatever the counts say
+        for group in range(min(int(content["GroupCount"]), len(content))):
+            for number in range(min(int(content[f"Gr{group}-Count"]), len(content))):
                 entries = sections.get(content.get(f"Gr{group}-Ch{number}", ""))
                 if entries is None:
                     continue
