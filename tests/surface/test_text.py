@@ -436,3 +436,40 @@ def test_points_far_from_a_grid_are_refused(tmp_path: Path, noise: float, said: 
     _noisy_triples(tmp_path / "a.xyz", noise)
     with pytest.raises(InputError, match=said):
         read_scan(tmp_path / "a.xyz", None)
+
+
+# --- Keyence -----------------------------------------------------------------------------------------
+
+
+def _keyence(separator: str, words: tuple[str, ...], channel: str = "Height", pitch: str = "138.5") -> str:
+    """A VK microscope's export, whose header is a published one: Kcsv2Bcr and vk4 converters name its lines."""
+    date, lens, calibration, image, columns, rows, low, unit = words
+    ny, nx = TOP_FIRST.shape
+    header = [(date, "2024/03/01 12:30:05"), (lens, "150"), (calibration, pitch, "nm"), (image, channel)]
+    header += [(columns, str(nx)), (rows, str(ny)), (low, "-50.000"), (unit, "µm")]
+    lines = [separator.join(f'"{cell}"' for cell in cells) for cells in header] + ["", f'"{channel}"']
+    point = "," if separator == ";" else "."
+    cells = [[f'"{value:.4f}"'.replace(".", point) for value in row] for row in TOP_FIRST]
+    return "\r\n".join([*lines, *(separator.join(row) for row in cells), ""])
+
+
+_ENGLISH = ("Measured date", "Objective Lens Power", "XY Calibration", "Output image data", "Horizontal", "Vertical",
+            "Minimum value", "Unit")  # fmt: skip
+_GERMAN = ("Gemessenes Datum", "Objektivvergrößerung", "XY-Justierung", "Bilddatenausg.", "Horizont.", "Vertikal",
+           "Mindestwert", "Einheit")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("separator", "words", "channel", "pitch"),
+    [(",", _ENGLISH, "Height", "138.5"), (";", _GERMAN, "Höhe", "138,5"), ("\t", _ENGLISH, "Height", "138.5")],
+)
+def test_keyence(tmp_path: Path, separator: str, words: tuple[str, ...], channel: str, pitch: str) -> None:
+    scan = read_scan(save(tmp_path, _keyence(separator, words, channel, pitch), "scan.csv"), None)
+    np.testing.assert_allclose(scan.heights, TOP_FIRST[::-1], atol=1e-4)
+    assert (scan.um_per_unit, scan.channel, scan.unread) == (1.0, channel, ())
+    assert scan.pitch_um == pytest.approx((0.1385, 0.1385))
+
+
+def test_keyence_without_heights(tmp_path: Path) -> None:
+    content = _keyence(",", _ENGLISH, "Laser")
+    assert "expected heights in a Keyence .csv, found 'Laser'" in message_of(save(tmp_path, content, "scan.csv"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.surface.readers import xyz
+from pipeline.surface.readers import keyence, xyz
 from pipeline.surface.readers.common import (
     check_shape,
     fault,
@@ -129,7 +129,7 @@ def utf16_without_mark(head: bytes) -> str | None:
 
 def _split(path: Path, content: str) -> _Content:
     """Separates the header from the rows of numbers. Raises InputError for a line that is neither."""
-    lines = content.splitlines()
+    lines = keyence.translated(path.name, content.splitlines())
     separator, decimal_comma = _separator(path, lines)
     usual = _typical_row(lines).count("\t")
     found = _Content([], [], [], [], separator, decimal_comma)
