@@ -60,7 +60,8 @@ def _print_formats(as_json: bool) -> None:
         console.print_json([asdict(entry) for entry in READ])
         return
     for entry in READ:
-        console.say(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}")
+        doubt = "" if entry.tried else ", not tried with a file"
+        console.say(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}{doubt}")
 
 
 def _schema(document: str) -> dict[str, Any]:
@@ -119,6 +120,6 @@ def _scan(path: Path, channel: str | None) -> dict[str, Any]:
         "mask covers": measured.masked_share,
         "lowest": float(valid.min()) if valid.size else None,
         "highest": float(valid.max()) if valid.size else None,
-        "warnings": [*measured.warnings, *refusals(path.name, scan, measured)],
+        "warnings": [*scan.warnings, *measured.warnings, *refusals(path.name, scan, measured)],
         "config needs": [key for key, needed in needs.items() if needed],
     }

@@ -98,10 +98,15 @@ def allowing(bytes_: int | None) -> Iterator[None]:
         _allowed.reset(token)
 
 
+def allowed() -> int | None:
+    """Returns the memory that a caller of `allowing` allows, bytes; None for all that the machine has."""
+    return _allowed.get()
+
+
 def limit() -> Limit:
     """Returns the memory that this process may hold in all: what a caller allows, or what the machine has left."""
-    allowed = _allowed.get()
-    return available() if allowed is None else Limit(allowed, "--memory")
+    stated = allowed()
+    return available() if stated is None else Limit(stated, "--memory")
 
 
 def available() -> Limit:
@@ -129,11 +134,11 @@ def require(what: str, more_bytes: int, remedy: str) -> None:
 
     what: the arrays, for the message. remedy: a sentence without its full stop.
     """
-    allowed, need = limit(), held_bytes() + more_bytes
-    if need > allowed.bytes:
+    most, need = limit(), held_bytes() + more_bytes
+    if need > most.bytes:
         raise ResourceError(
             f"{what} need {in_words(more_bytes)}, {in_words(need)} with all that is held, more than the "
-            f"{in_words(allowed.bytes)} of {allowed.source}; {remedy}"
+            f"{in_words(most.bytes)} of {most.source}; {remedy}"
         )
 
 

@@ -98,7 +98,7 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
         cropped=measured.cropped,
         holes=measured.holes,
         masked_share=measured.masked_share,
-        warnings=measured.warnings if populations is None else (*measured.warnings, populations),
+        warnings=(*scan.warnings, *measured.warnings, *(() if populations is None else (populations,))),
     )
     return field, record
 

@@ -18,7 +18,7 @@ class Scan:
     format: the format in words. reader: the library that read it, with its version.
     mask: bool (ny, nx), true where a mask of the file covers the channel; None where it has none.
     steps: sample distance along (x, y) in a unit that the file does not state; only its ratio can be checked.
-    unread: lines of a header with numbers or units that were not understood.
+    unread: lines of a header with numbers or units that were not understood. warnings: sentences for the user.
     """
 
     heights: NDArray[np.float64]
@@ -32,3 +32,4 @@ class Scan:
     mask: NDArray[np.bool_] | None = None
     steps: tuple[float, float] | None = None
     unread: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()

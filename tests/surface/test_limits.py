@@ -8,8 +8,10 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from dataclasses import asdict
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZIP_LZMA, ZipFile
+from zlib import compressobj
 
 import numpy as np
 import pytest
@@ -17,7 +19,8 @@ from click.testing import CliRunner
 from PIL import Image
 
 from cli.main import cli
-from pipeline.errors import ConfigError, InputError
+from pipeline import resources
+from pipeline.errors import ConfigError, InputError, ResourceError
 from pipeline.surface.readers import limited, read_scan, reading, require_file
 from pipeline.surface.readers.formats import BY_LIBRARY
 from tests.support import shared_file
@@ -60,7 +63,7 @@ def with_reader(monkeypatch: pytest.MonkeyPatch, name: str, processor_s: float =
         "limited.main()"
     )
     monkeypatch.setattr(limited, "_CODE", code)
-    monkeypatch.setattr(limited, "limits", lambda _: limited.Limits(processor_s, clock_s, 1 << 30))
+    monkeypatch.setattr(limited, "limits", lambda _: limited.Limits(processor_s, clock_s, 1 << 30, 2 << 30))
 
 
 def test_a_child_hands_back_what_the_reader_returns(tmp_path: Path, text: Path) -> None:
@@ -140,7 +143,7 @@ def test_every_reader_of_the_library_is_found_without_the_rest_of_it() -> None:
     code = (
         "import sys; from pipeline.surface.readers import spm; spm.import_readers_alone()\n"
         f"assert all(map(spm._reader, {tuple(BY_LIBRARY)!r}))\n"
-        "assert 'matplotlib' not in sys.modules"
+        "assert not {'matplotlib', 'scipy.optimize', 'asyncio'} & sys.modules.keys()"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(limited.__file__).parents[3])
 
@@ -238,6 +241,56 @@ def test_an_npz_with_a_wrong_checksum(tmp_path: Path) -> None:
     assert "damaged" in message_of(path)
 
 
+# --- compressed scans, whose files say little of their samples ----------------------------------------
+
+
+def tiff(path: Path, heights: np.ndarray, more: bytes = b"") -> Path:
+    """A deflated TIFF of doubles in one strip, whose stream goes on with other bytes."""
+    tifffile = pytest.importorskip("tifffile")
+    packed = compressobj()
+    strip = packed.compress(heights.tobytes()) + packed.compress(more) + packed.flush()
+    tifffile.imwrite(
+        path, iter([strip]), shape=heights.shape, dtype=heights.dtype, compression="zlib", rowsperstrip=len(heights)
+    )
+    return path
+
+
+def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits reading to what small files need, so that fewer samples exceed it."""
+    monkeypatch.setattr(limited, "limits", lambda _: limited.Limits(3.0, 60.0, 160 << 20, 2 << 30))
+
+
+def test_a_scan_may_take_what_its_header_states(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    narrow(monkeypatch)
+    heights = np.tile(np.arange(2560.0) % 64, (2048, 1))
+    scan = read_scan(tiff(tmp_path / "large.tif", heights), None)
+    np.testing.assert_array_equal(scan.heights, heights)
+    assert (tmp_path / "large.tif").stat().st_size < 400_000
+
+
+def test_a_scan_that_inflates_to_more_than_its_header_states(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    narrow(monkeypatch)
+    path = tiff(tmp_path / "bomb.tif", np.ones((64, 64)), bytes(240 << 20))
+    assert path.stat().st_size < 400_000
+    assert "asks for more" in message_of(path)
+
+
+@pytest.mark.parametrize("suffix", ["tif", "npy", "gsf"])
+def test_a_scan_that_is_larger_than_the_memory_is_refused_by_its_header(tmp_path: Path, suffix: str) -> None:
+    """Without the samples: the file is cut behind its header."""
+    heights, path = np.ones((1000, 4000)), tmp_path / f"scan.{suffix}"
+    if suffix == "tif":
+        tiff(path, heights)
+    elif suffix == "npy":
+        np.save(path, heights)
+        os.truncate(path, 200)
+    else:
+        path.write_bytes(b"Gwyddion Simple Field 1.0\nXRes = 4000\nYRes = 1000\n\0\0")
+    words = rf"^scan\.{suffix}: 4000 x 1000 samples need 183 MiB, .* of --memory; crop the scan"
+    with resources.allowing(150 << 20), pytest.raises(ResourceError, match=words):
+        read_scan(path, None)
+
+
 # --- what is no file ---------------------------------------------------------------------------------
 
 
@@ -285,7 +338,7 @@ def test_commands_refuse_a_pipe_at_once(tmp_path: Path, command: str) -> None:
 
 def test_an_answer_is_text_and_samples(text: Path) -> None:
     """What a child says is never unpickled."""
-    request = json.dumps([str(text), None, 5.0, 60.0, 1 << 30])
+    request = json.dumps([str(text), None, asdict(limited.limits(1000)), None])
     code = "from pipeline.surface.readers.limited import main; main()"
     run = subprocess.run([sys.executable, "-c", code, request], capture_output=True, check=True,
                          cwd=Path(limited.__file__).parents[3])  # fmt: skip

@@ -1,6 +1,8 @@
 """Files of microscopes that the tests write: fields, directions, names, dates, and channels beside the heights."""
 
 import struct
+import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -194,6 +196,16 @@ def test_nanosurf_needs_no_date(tmp_path: Path, info: str) -> None:
     np.testing.assert_allclose(found.heights, stored * 2e-6 / 65536, atol=1e-20)
     assert found.pitch_um == pytest.approx((10 / 16, 20 / 12))
     assert (found.um_per_unit, found.channel) == (1e6, "Scan forward (Z-Axis)")
+
+
+@pytest.mark.parametrize("entry", [b"GroupCount=1", b"Gr0-Count=1"])
+def test_counts_of_nanosurf_are_not_trusted(tmp_path: Path, entry: bytes) -> None:
+    path = write_nid(tmp_path / "scan.nid", [(codes(12, 16), {})])
+    path.write_bytes(path.read_bytes().replace(entry, entry[:-1] + b"9" * 12))
+    begun = time.process_time()
+    with suppress(InputError):
+        read_scan(path, None)
+    assert time.process_time() - begun < 1
 
 
 @pytest.mark.parametrize("unit", ["Unit0", "", "1/s", "V"])

@@ -1,5 +1,6 @@
 """Text files: headers of several programs, marks of missing samples, index columns, x y z triples."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -397,3 +398,78 @@ def test_separators_of_thousands_are_named(tmp_path: Path) -> None:
     rows = "\n".join(";".join(f"{20000 + v:,.1f}" for v in row) for row in TOP_FIRST)
     message = message_of(save(tmp_path, rows + "\n"), pitch_um=0.1, height_unit="nm")
     assert "where a comma is the decimal point; export them without separators of thousands" in message
+
+
+# --- coordinates by sensors --------------------------------------------------------------------------
+
+
+def _noisy_triples(path: Path, noise: float, missing: int = 0) -> NDArray[np.float64]:
+    """Points in no order, each beside its grid point by normal noise, in steps."""
+    chance = np.random.default_rng(1)
+    y, x = np.mgrid[:30, :40].astype(float)
+    heights = np.sin(x / 5) + 0.1 * y
+    points = np.stack((x, y), axis=-1) + noise * chance.standard_normal((30, 40, 2))
+    table = np.column_stack(((points * (0.1, 0.2)).reshape(-1, 2), heights.ravel()))
+    np.savetxt(path, table[chance.permutation(len(table))[missing:]])
+    return heights
+
+
+@pytest.mark.parametrize(("noise", "missing"), [(0.02, 0), (0.045, 0), (0.02, 100)])
+def test_points_beside_their_grid_are_taken_as_its_points(tmp_path: Path, noise: float, missing: int) -> None:
+    heights = _noisy_triples(tmp_path / "a.xyz", noise, missing)
+    scan = read_scan(tmp_path / "a.xyz", None)
+    assert np.count_nonzero(np.isnan(scan.heights)) == missing
+    assert np.nanmax(np.abs(scan.heights - heights)) < 1e-12
+    assert scan.steps == pytest.approx((0.1, 0.2), rel=2e-3)
+    told = re.search(
+        r"beside their grid by ([\d.]+) % .* changes heights by ([\d.]+) % of their rms", scan.warnings[0]
+    )
+    assert told is not None
+    assert float(told[1]) == pytest.approx(100 * noise, rel=0.1)
+    assert 0 < float(told[2]) < 100 * noise
+    _, record = load_scan(SurfaceSource(path=str(tmp_path / "a.xyz"), pitch_um=(0.1, 0.2), height_unit="um"))
+    assert scan.warnings[0] in record.warnings
+
+
+@pytest.mark.parametrize(("noise", "said"), [(0.08, "off by 8"), (0.3, "steps along x")])
+def test_points_far_from_a_grid_are_refused(tmp_path: Path, noise: float, said: str) -> None:
+    _noisy_triples(tmp_path / "a.xyz", noise)
+    with pytest.raises(InputError, match=said):
+        read_scan(tmp_path / "a.xyz", None)
+
+
+# --- Keyence -----------------------------------------------------------------------------------------
+
+
+def _keyence(separator: str, words: tuple[str, ...], channel: str = "Height", pitch: str = "138.5") -> str:
+    """A VK microscope's export, whose header is a published one: Kcsv2Bcr and vk4 converters name its lines."""
+    date, lens, calibration, image, columns, rows, low, unit = words
+    ny, nx = TOP_FIRST.shape
+    header = [(date, "2024/03/01 12:30:05"), (lens, "150"), (calibration, pitch, "nm"), (image, channel)]
+    header += [(columns, str(nx)), (rows, str(ny)), (low, "-50.000"), (unit, "µm")]
+    lines = [separator.join(f'"{cell}"' for cell in cells) for cells in header] + ["", f'"{channel}"']
+    point = "," if separator == ";" else "."
+    cells = [[f'"{value:.4f}"'.replace(".", point) for value in row] for row in TOP_FIRST]
+    return "\r\n".join([*lines, *(separator.join(row) for row in cells), ""])
+
+
+_ENGLISH = ("Measured date", "Objective Lens Power", "XY Calibration", "Output image data", "Horizontal", "Vertical",
+            "Minimum value", "Unit")  # fmt: skip
+_GERMAN = ("Gemessenes Datum", "Objektivvergrößerung", "XY-Justierung", "Bilddatenausg.", "Horizont.", "Vertikal",
+           "Mindestwert", "Einheit")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("separator", "words", "channel", "pitch"),
+    [(",", _ENGLISH, "Height", "138.5"), (";", _GERMAN, "Höhe", "138,5"), ("\t", _ENGLISH, "Height", "138.5")],
+)
+def test_keyence(tmp_path: Path, separator: str, words: tuple[str, ...], channel: str, pitch: str) -> None:
+    scan = read_scan(save(tmp_path, _keyence(separator, words, channel, pitch), "scan.csv"), None)
+    np.testing.assert_allclose(scan.heights, TOP_FIRST[::-1], atol=1e-4)
+    assert (scan.um_per_unit, scan.channel, scan.unread) == (1.0, channel, ())
+    assert scan.pitch_um == pytest.approx((0.1385, 0.1385))
+
+
+def test_keyence_without_heights(tmp_path: Path) -> None:
+    content = _keyence(",", _ENGLISH, "Laser")
+    assert "expected heights in a Keyence .csv, found 'Laser'" in message_of(save(tmp_path, content, "scan.csv"))

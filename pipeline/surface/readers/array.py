@@ -10,7 +10,8 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.surface.readers.common import check_shape, fault, library_version, pick_channel, third_party
+from pipeline.surface.readers.common import fault, library_version, pick_channel, third_party
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _CHANNEL = "array"
@@ -92,7 +93,7 @@ def _matrices(archive: ZipFile, members: Sequence[ZipInfo]) -> dict[str, tuple[Z
 
 
 def _check(path: Path, header: _Header) -> None:
-    check_shape(path.name, header.shape)
+    make_room(path.name, header.shape)
     if header.dtype.kind not in "iuf":
         found = "an array of Python objects" if header.dtype.hasobject else f"an array of {header.dtype}"
         raise fault(path.name, "real numbers", found, "save the heights as float64")

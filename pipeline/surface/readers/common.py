@@ -6,9 +6,9 @@ import warnings
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
-from pipeline.errors import InputError
+from pipeline.errors import BakeError, InputError
 
 MIN_SAMPLES = 8
 MAX_SAMPLES = 8192
@@ -79,7 +79,7 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except (InputError, MemoryError):
+    except (BakeError, MemoryError):
         raise
     except ImportError as error:
         missing = error.name or library
@@ -94,6 +94,17 @@ def third_party(file: str, expected: str, library: str) -> Iterator[None]:
         raise fault(file, expected, f"content that {library} cannot read ({cause})", _way_out(error)) from None
 
 
+@contextmanager
+def replaced(owner: Any, name: str, value: object) -> Iterator[None]:
+    """Gives an attribute of a library's module or class another value for a while."""
+    former = getattr(owner, name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, former)
+
+
 def _way_out(error: Exception) -> str:
     """Returns the remedy; a file is called damaged only where the error is one of missing bytes."""
     named_so = type(error).__name__ in ("CorruptFile", "BadZipFile", "IncompleteRead")
@@ -104,6 +115,8 @@ def _way_out(error: Exception) -> str:
 
 def library_version(library: str) -> str:
     """Returns the name of a library with its version."""
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return f"{library} {version(library)}"
     except PackageNotFoundError:
@@ -113,7 +126,7 @@ def library_version(library: str) -> str:
 def check_shape(file: str, shape: Sequence[int]) -> None:
     """Requires a shape (ny, nx) with MIN_SAMPLES..MAX_SAMPLES along both axes; else raises InputError.
 
-    Readers call it before they decode, so that a wrong size in a header allocates no memory.
+    Readers call `room.make_room`, which calls it, before they decode: a wrong size in a header allocates no memory.
     """
     in_words = " x ".join(str(n) for n in shape) or "one number"
     if len(shape) != 2:

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.surface.readers.common import check_shape, fault, library_version, micrometres, pick_channel
+from pipeline.surface.readers.common import fault, library_version, micrometres, pick_channel
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 MAGIC = b"Gwyddion Simple Field 1.0\n"
@@ -28,7 +29,7 @@ def read(path: Path, channel: str | None) -> Scan:
         size = float(header.get("XReal", nx)), float(header.get("YReal", ny))
     except (KeyError, ValueError) as error:
         raise fault(path.name, _EXPECTED, f"a header without a valid entry ({error})", _CUT) from None
-    check_shape(path.name, (ny, nx))
+    make_room(path.name, (ny, nx))
     # one to four NUL bytes end the header at a multiple of four
     start = end + 4 - end % 4
     present = path.stat().st_size - start

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import (
-    check_shape,
     library_version,
     micrometres,
     pick_channel,
     third_party,
     unique_names,
 )
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _MAGIC = b"GWYP"
@@ -135,7 +135,7 @@ def _unit(data: Any, key: str) -> str:
 
 
 def _heights(path: Path, data: Any) -> NDArray[np.float64]:
-    check_shape(path.name, (int(data["yres"]), int(data["xres"])))
+    make_room(path.name, (int(data["yres"]), int(data["xres"])))
     return np.array(data.data[::-1], dtype=np.float64, order="C")
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import (
-    check_shape,
     fault,
     library_version,
     micrometres,
@@ -21,6 +20,7 @@ from pipeline.surface.readers.common import (
     third_party,
     unique_names,
 )
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _GRID = "position-pattern.grid."
@@ -90,7 +90,7 @@ def _chosen(path: Path, channels: list[_Channel], channel: str | None) -> tuple[
     names = unique_names([found.name for found in channels])
     index = pick_channel(path.name, names, channel)
     chosen = channels[index]
-    check_shape(path.name, chosen.shape)
+    make_room(path.name, chosen.shape)
     expected = chosen.shape[0] * chosen.shape[1] * chosen.frames
     if chosen.data.size != expected:
         found = f"{chosen.data.size} samples"

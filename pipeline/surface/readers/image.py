@@ -18,6 +18,7 @@ from pipeline.surface.readers.common import (
     pick_channel,
     third_party,
 )
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 # Pillow logs faults of damaged files, and logging prints to stderr where no handler is set
@@ -100,7 +101,7 @@ def _opened(path: Path, file: BinaryIO) -> Image.Image:
 
 def _by_pillow(path: Path, opened: Image.Image, kind: tuple[int, int], found: tiff.Tags) -> _Pixels:
     """Returns the pixels of an image that Pillow reads as they are stored; it also turns them as a tag says."""
-    check_shape(path.name, (opened.height, opened.width))
+    make_room(path.name, (opened.height, opened.width))
     pages = getattr(opened, "n_frames", 1)
     if pages != 1:
         raise fault(path.name, "one image", f"{pages} pages", "save the page with the heights alone")
@@ -155,7 +156,7 @@ def _by_tifffile(path: Path, kind: tuple[int, int], found: tiff.Tags) -> _Pixels
                 pages = f"{len(opened.pages)} pages"
                 raise fault(path.name, "one image", pages, "save the page with the heights alone")
             page = opened.pages[0]
-            check_shape(path.name, page.shape)
+            make_room(path.name, page.shape)
             try:
                 stored = page.asarray()
             except ValueError as error:

@@ -13,28 +13,23 @@ import stat
 import subprocess
 import sys
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.errors import InputError
+from pipeline import resources
+from pipeline.errors import InputError, ResourceError
 from pipeline.surface.readers.common import check_shape, fault, one_line
+from pipeline.surface.readers.room import Limits, limits, memory_limit, set_limits
 from pipeline.surface.scan import Scan
 
 # a scan of 8192 x 8192 samples with seven other channels of doubles; as text of x y z triples it has 3 GB
 _MOST_BYTES = 5 << 30
 # a file of this size or more, of which less than this share was written, is empty space
 _SPARSE_BYTES, _SPARSE_SHARE = 64 << 20, 1 / 64
-# processor time: the largest library is imported in 0.5 s, a small file is read in 0.1 s, a MB of text in 0.1 s
-_SECONDS, _SECONDS_PER_BYTE = 3.0, 4e-7
-# time on the clock beyond it, for a process that waits instead of computing, or shares its processor with many
-_PATIENCE = 8.0
-# memory: libraries take 0.1 GB, 8192 x 8192 samples in double precision 0.5 GB; from a file of 16-bit codes a reader
-# keeps up to three copies of a channel in double precision, and text takes ten times its size
-_BYTES, _BYTES_PER_BYTE = 768 << 20, 16
 # exit code of a child that lacks the memory even for an answer
 _NO_MEMORY = 9
 # JSON with all that is known of a scan except its samples
@@ -46,28 +41,14 @@ _DAMAGED = "the file may be damaged: copy or export it again"
 _CODE = "import sys; sys.path.append({root!r}); from pipeline.surface.readers.limited import main; main()"
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What reading a file may take: seconds of a processor, seconds on the clock, bytes of memory."""
-
-    processor_s: float
-    clock_s: float
-    memory_bytes: int
-
-
-def limits(size: int) -> Limits:
-    """Computes what reading a file of `size` bytes may take."""
-    seconds = _SECONDS + _SECONDS_PER_BYTE * size
-    return Limits(seconds, _PATIENCE * seconds, _BYTES + _BYTES_PER_BYTE * size)
-
-
 def read_scan(path: Path, channel: str | None) -> Scan:
     """Reads one channel of a scan file, whose format is recognised by content.
 
     path: the file. channel: name of the channel; None takes the height channel.
     Returns the channel as stored.
     Raises InputError where the file cannot be opened, has an unknown format, is damaged, or lacks the channel, and
-    where reading it takes more time or memory than a file of its size may.
+    where reading it takes more time or memory than a file of its size and the samples that it states may;
+    ResourceError where its samples need more memory than there is.
     """
     size = require_file(path)
     if _is_array(path):
@@ -78,7 +59,8 @@ def read_scan(path: Path, channel: str | None) -> Scan:
             with np.errstate(all="ignore"):
                 return read(path, channel)
         except MemoryError:
-            raise _too_large(path.name, limits(size)) from None
+            allowed = limits(size)
+            raise _too_large(path.name, allowed.memory_bytes, allowed) from None
     return _by_child(path, channel, limits(size))
 
 
@@ -140,7 +122,7 @@ def _is_array(path: Path) -> bool:
 
 def _by_child(path: Path, channel: str | None, allowed: Limits) -> Scan:
     """Reads a scan in a child process. The child never outlives this call, whatever ends it."""
-    request = json.dumps([os.fspath(path), channel, allowed.processor_s, allowed.clock_s, allowed.memory_bytes])
+    request = json.dumps([os.fspath(path), channel, asdict(allowed), resources.allowed()])
     code = _CODE.format(root=str(Path(__file__).parents[3]))
     # -P: no module is imported from the current folder. A group of its own: a terminal's Ctrl-C reaches this process
     # alone, which then kills the child. One thread: others would take memory of their own
@@ -168,7 +150,7 @@ def received(file: str, answer: IO[bytes], allowed: Limits) -> Scan | None:
     """Takes a child's answer; None where it ended without one.
 
     file: name of the scan file, for messages. answer: what `answer` below writes. allowed: the limits of the child.
-    Raises InputError where the child says that the file cannot be read.
+    Raises InputError or ResourceError where the child says that the file cannot be read.
     """
     line = answer.readline(_MOST_ANSWER)
     if len(line) == _MOST_ANSWER:
@@ -178,8 +160,10 @@ def received(file: str, answer: IO[bytes], allowed: Limits) -> Scan | None:
     found = json.loads(line)
     if "refused" in found:
         raise InputError(found["refused"])
+    if "unfit" in found:
+        raise ResourceError(found["unfit"])
     if "memory" in found:
-        raise _too_large(file, allowed)
+        raise _too_large(file, found["memory"], allowed)
     if "failed" in found:
         raise fault(file, "a scan that can be read", one_line(f"one that ends in {found['failed']}"), _DAMAGED)
     ny, nx = shape = found.pop("shape")
@@ -213,15 +197,19 @@ def ended(file: str, code: int, allowed: Limits) -> Exception:
         seconds = allowed.processor_s if code == -signal.SIGPROF else allowed.clock_s
         return fault(file, f"a scan that is read within {seconds:.3g} s", "one that takes longer", _DAMAGED)
     if code == _NO_MEMORY:
-        return _too_large(file, allowed)
+        return _too_large(file, allowed.memory_bytes, allowed)
     if code < 0:
         name = signal.Signals(-code).name if -code in signal.valid_signals() else f"signal {-code}"
         return fault(file, "a scan that can be read", f"one on which the reader crashed ({name})", _DAMAGED)
     return RuntimeError(f"the process that reads {file} ended with {code} and no answer")
 
 
-def _too_large(file: str, allowed: Limits) -> InputError:
-    expected = f"a scan that is read in {allowed.memory_bytes / 1e9:.2g} GB of memory, enough for a file of its size"
+def _too_large(file: str, memory_bytes: int, allowed: Limits) -> InputError | ResourceError:
+    """Returns the error for a reader that asked for more than `memory_bytes`."""
+    if memory_bytes >= allowed.most_bytes:
+        most, source = resources.in_words(memory_bytes), resources.limit().source
+        return ResourceError(f"{file}: needs more than {most} to be read, of {source}; crop the scan")
+    expected = f"a scan that is read in {memory_bytes / 1e9:.2g} GB of memory, enough for what its header states"
     return fault(file, expected, "one that asks for more", _DAMAGED)
 
 
@@ -230,7 +218,7 @@ def _too_large(file: str, allowed: Limits) -> InputError:
 
 def main() -> None:
     """Reads the scan that the first argument names, and writes the answer to stdout: all that the child does."""
-    path, channel, processor_s, clock_s, memory_bytes = json.loads(sys.argv[1])
+    path, channel, allowed, allowed_bytes = json.loads(sys.argv[1])
     with os.fdopen(os.dup(1), "wb") as stream:
         # lines that libraries print do not belong to the answer
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -239,7 +227,8 @@ def main() -> None:
 
         spm.import_readers_alone()
         try:
-            answer(stream, Path(path), channel, Limits(processor_s, clock_s, memory_bytes))
+            with resources.allowing(allowed_bytes):
+                answer(stream, Path(path), channel, Limits(**allowed))
         except MemoryError:
             os._exit(_NO_MEMORY)
     os._exit(0)
@@ -247,7 +236,7 @@ def main() -> None:
 
 def answer(stream: BinaryIO, path: Path, channel: str | None, allowed: Limits) -> None:
     """Reads a scan within limits that hold for this process from now on, and writes it, or why it is refused."""
-    _set_limits(allowed)
+    set_limits(allowed)
     try:
         from pipeline.surface.readers.reading import read
 
@@ -256,8 +245,10 @@ def answer(stream: BinaryIO, path: Path, channel: str | None, allowed: Limits) -
         check_shape(path.name, scan.heights.shape)
     except InputError as error:
         _write_line(stream, {"refused": str(error)})
+    except ResourceError as error:
+        _write_line(stream, {"unfit": str(error)})
     except MemoryError:
-        _write_line(stream, {"memory": True})
+        _write_line(stream, {"memory": memory_limit()})
     # libraries raise what they like, SystemExit included
     except BaseException as error:
         _write_line(stream, {"failed": f"{type(error).__name__}: {error}"[:1000]})
@@ -273,18 +264,6 @@ def answer(stream: BinaryIO, path: Path, channel: str | None, allowed: Limits) -
 
 def _write_line(stream: BinaryIO, found: dict[str, Any]) -> None:
     stream.write(json.dumps(found, default=float).encode() + b"\n")
-
-
-def _set_limits(allowed: Limits) -> None:
-    import resource
-
-    # the defaults of these signals end the process, whatever code is running
-    signal.setitimer(signal.ITIMER_PROF, allowed.processor_s)
-    signal.setitimer(signal.ITIMER_REAL, allowed.clock_s)
-    resource.setrlimit(resource.RLIMIT_DATA, (allowed.memory_bytes, allowed.memory_bytes))
-    # nothing that is read needs a file of its own
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _end_with_parent() -> None:

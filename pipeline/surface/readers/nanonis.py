@@ -2,19 +2,19 @@
 
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import (
-    check_shape,
     fault,
     library_version,
     micrometres,
     pick_channel,
+    replaced,
     third_party,
 )
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _BACKWARD = " backward"
@@ -30,8 +30,8 @@ def read(path: Path, channel: str | None) -> Scan:
 
         # it takes the kind of a file from the suffix
         with (
-            patch.object(nanonis, "_is_valid_file", lambda _, ext: ext),
-            patch.object(nanonis.Scan, "_determine_filetype", lambda _: "scan"),
+            replaced(nanonis, "_is_valid_file", lambda _, ext: ext),
+            replaced(nanonis.Scan, "_determine_filetype", lambda _: "scan"),
         ):
             stored = nanonis.Scan(str(path))
         units = dict(zip(stored.header["data_info"]["Name"], stored.header["data_info"]["Unit"], strict=True))
@@ -49,7 +49,7 @@ def _heights(path: Path, stored: Any, name: str) -> NDArray[np.float64]:
     """Turns a channel so that x grows to the right and y upwards; the file has samples in the order of scanning."""
     direction = "backward" if name.endswith(_BACKWARD) else "forward"
     lines = np.array(stored.signals[name.removesuffix(_BACKWARD)][direction], dtype=np.float64)
-    check_shape(path.name, lines.shape)
+    make_room(path.name, lines.shape)
     if direction == "backward":
         # backward scans begin at the right
         lines = lines[:, ::-1]

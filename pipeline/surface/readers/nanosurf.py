@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.surface.readers.common import (
-    check_shape,
     fault,
     library_version,
     micrometres,
     pick_channel,
     unique_names,
 )
+from pipeline.surface.readers.room import make_room
 from pipeline.surface.scan import Scan
 
 _DATA = b"#!"
@@ -65,7 +65,7 @@ def read(path: Path, channel: str | None) -> Scan:
     sets = [found for found in _data_sets(path, data) if found.is_height_map]
     names = unique_names([found.name for found in sets])
     chosen = sets[index := pick_channel(path.name, names, channel)]
-    check_shape(path.name, chosen.shape)
+    make_room(path.name, chosen.shape)
     rows, columns = chosen.shape
     if chosen.start + chosen.nbytes > len(data):
         found = f"{len(data)} bytes where {chosen.name!r} ends at byte {chosen.start + chosen.nbytes}"
@@ -101,8 +101,9 @@ def _data_sets(path: Path, data: bytes) -> list[_DataSet]:
     content = sections.get("DataSet", {})
     found = []
     with _valid_entries(path):
-        for group in range(int(content["GroupCount"])):
-            for number in range(int(content[f"Gr{group}-Count"])):
+        # no more sets than entries, whatever the counts say
+        for group in range(min(int(content["GroupCount"]), len(content))):
+            for number in range(min(int(content[f"Gr{group}-Count"]), len(content))):
                 entries = sections.get(content.get(f"Gr{group}-Ch{number}", ""))
                 if entries is None:
                     continue

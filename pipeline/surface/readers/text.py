@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.surface.readers import xyz
+from pipeline.surface.readers import keyence, xyz
 from pipeline.surface.readers.common import (
     check_shape,
     fault,
@@ -66,6 +66,7 @@ def read(path: Path, channel: str | None) -> Scan:
     table = _table(path, content)
     table, steps, labels = _without_labels(content, table)
     triples = table.shape[1] == 3 and table.shape[0] > 3
+    warnings: tuple[str, ...] = ()
     header = understand(path.name, content.header, triples)
     if header.no_data is not None:
         table[table == header.no_data] = np.nan
@@ -74,7 +75,7 @@ def read(path: Path, channel: str | None) -> Scan:
         header = _with_names(header, content.names)
         # Gwyddion separates by tabs
         grid = xyz.grid(path.name, table, header.gwyddion_triples or content.separator == "\t")
-        heights, header = grid.heights, replace(header, steps=grid.steps)
+        heights, header, warnings = grid.heights, replace(header, steps=grid.steps), grid.warnings
         form += ", x y z triples with y " + ("downwards, as Gwyddion writes them" if grid.y_down else "upwards")
     else:
         heights = np.ascontiguousarray(_matrix(path, header, table)[::-1])
@@ -94,6 +95,7 @@ def read(path: Path, channel: str | None) -> Scan:
         library_version("numpy"),
         steps=relative,
         unread=header.unread,
+        warnings=warnings,
     )
 
 
@@ -127,7 +129,7 @@ def utf16_without_mark(head: bytes) -> str | None:
 
 def _split(path: Path, content: str) -> _Content:
     """Separates the header from the rows of numbers. Raises InputError for a line that is neither."""
-    lines = content.splitlines()
+    lines = keyence.translated(path.name, content.splitlines())
     separator, decimal_comma = _separator(path, lines)
     usual = _typical_row(lines).count("\t")
     found = _Content([], [], [], [], separator, decimal_comma)

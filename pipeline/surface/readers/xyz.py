@@ -6,6 +6,7 @@ from decimal import Decimal
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.errors import InputError
 from pipeline.surface.readers.common import check_shape, fault
 
 # coordinates closer than this share of the field are one grid line, up to rounding errors
@@ -16,6 +17,12 @@ _EVEN = 0.01
 _HIDES = 0.3
 # fewest significant digits of coordinates that were rounded in print
 _ROUNDED_DIGITS = 3
+# of coordinates that a sensor measured: largest rms distance from the grid, and of a single point, in steps. A height
+# that is taken for that of its grid point errs by slope times distance
+_MOST_OFF, _FARTHEST = 0.05, 0.25
+# gaps between the grid lines of such coordinates, in the widest gap
+_GAP = 0.25
+_MATRIX = "export a matrix"
 # distinct coordinates that are looked at to find how many digits were printed
 _LOOKED_AT = 10000
 
@@ -25,28 +32,34 @@ class Grid:
     """Triples on their grid.
 
     heights: (ny, nx), y upwards, NaN where a point is missing. steps: distance of grid lines along (x, y), in the
-    file's unit. y_down: whether the file's y grows downwards.
+    file's unit. y_down: whether the file's y grows downwards. warnings: sentences for the user.
     """
 
     heights: NDArray[np.float64]
     steps: tuple[float, float]
     y_down: bool
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """The index of each point's grid line, ascending with the coordinate, the number of lines and their distance."""
+    """The index of each point's grid line, ascending with the coordinate, the number of lines and their distance.
+
+    off: distance of each point from its line, in steps; None where it is rounding.
+    """
 
     index: NDArray[np.intp]
     count: int
     step: float
+    off: NDArray[np.float64] | None = None
 
 
 def grid(file: str, table: NDArray[np.float64], gwyddion: bool) -> Grid:
     """Arranges triples on their grid.
 
     Gwyddion writes its rows from the top, with y growing downwards from row to row; all other triples have y upwards.
-    Coordinates may be rounded in print: a regular grid of rounded coordinates is regular.
+    Coordinates may be rounded in print: a regular grid of rounded coordinates is regular. Those that a sensor
+    measured lie beside their grid, and are taken as its points where their distance is small, with a warning.
 
     file: its name, for messages. table: x, y, z, (n, 3). gwyddion: whether the text has the form that Gwyddion
         writes; its points must also follow each other row by row with y ascending.
@@ -55,25 +68,100 @@ def grid(file: str, table: NDArray[np.float64], gwyddion: bool) -> Grid:
     for column, axis in enumerate("xy"):
         if not np.isfinite(table[:, column]).all():
             raise fault(file, f"finite {axis} coordinates", "NaN or infinity", "export it again")
-    row_length = _row_length(table)
-    if row_length is not None:
-        x = _axis_of_rows(file, "x", table[:row_length, 0])
-        y = _axis_of_rows(file, "y", table[::row_length, 1])
-        x_index = np.tile(x.index, y.count)
-        y_index = np.repeat(y.index, x.count)
-        y_down = gwyddion and y.index[0] == 0
-    else:
-        x, y = _axis_of_points(file, "x", table[:, 0]), _axis_of_points(file, "y", table[:, 1])
-        x_index, y_index, y_down = x.index, y.index, False
+    try:
+        x, y, y_down = _regular(file, table, gwyddion)
+    except InputError:
+        measured = _measured_grid(file, table)
+        if measured is None:
+            raise
+        x, y, y_down = *measured, False
     check_shape(file, (y.count, x.count))
-    flat = y_index * x.count + x_index
+    flat = y.index * x.count + x.index
     if np.unique(flat).size != flat.size or 2 * flat.size < x.count * y.count:
         found = f"{flat.size} points for {y.count} x {x.count}"
-        raise fault(file, "x y z triples, one for each grid point", found, "export a matrix")
+        raise fault(file, "x y z triples, one for each grid point", found, _MATRIX)
     points = np.full(y.count * x.count, np.nan)
     points[flat] = table[:, 2]
     heights = points.reshape(y.count, x.count)
-    return Grid(np.ascontiguousarray(heights[::-1]) if y_down else heights, (x.step, y.step), y_down)
+    warnings = _warnings(heights, x, y)
+    heights = np.ascontiguousarray(heights[::-1]) if y_down else heights
+    return Grid(heights, (x.step, y.step), y_down, warnings)
+
+
+def _regular(file: str, table: NDArray[np.float64], gwyddion: bool) -> tuple[_Axis, _Axis, bool]:
+    """Finds the grid of coordinates that lie on one, and whether y grows downwards."""
+    row_length = _row_length(table)
+    if row_length is None:
+        return _axis_of_points(file, "x", table[:, 0]), _axis_of_points(file, "y", table[:, 1]), False
+    x = _axis_of_rows(file, "x", table[:row_length, 0])
+    y = _axis_of_rows(file, "y", table[::row_length, 1])
+    y_down = bool(gwyddion and y.index[0] == 0)
+    return (
+        _Axis(np.tile(x.index, y.count), x.count, x.step),
+        _Axis(np.repeat(y.index, x.count), y.count, y.step),
+        y_down,
+    )
+
+
+def _measured_grid(file: str, table: NDArray[np.float64]) -> tuple[_Axis, _Axis] | None:
+    """Finds the grid of coordinates that a sensor measured; None where they are no such ones.
+
+    Raises InputError where they are, and lie too far from their grid.
+    """
+    x, y = (_measured_axis(table[:, column]) for column in (0, 1))
+    if x is None or y is None:
+        return None
+    rms, largest = _off(x, y)
+    if rms <= _MOST_OFF and largest <= _FARTHEST:
+        return x, y
+    # coordinates that were computed repeat
+    if 4 * np.unique(table[:, 0]).size <= 3 * len(table):
+        return None
+    raise fault(
+        file,
+        f"points of a regular grid, to {100 * _MOST_OFF:g} % of its step (rms)",
+        f"some off by {100 * rms:.2g} % rms, {100 * largest:.2g} % at most",
+        "interpolate them to a grid (in Gwyddion: XYZ data, Rasterize) and export a matrix",
+    )
+
+
+def _measured_axis(values: NDArray[np.float64]) -> _Axis | None:
+    """Finds the grid lines of coordinates that a sensor measured, by the gaps between them; None without gaps."""
+    order = np.argsort(values)
+    gaps = np.diff(values[order])
+    wide = gaps > _GAP * gaps.max()
+    line = np.concatenate(([0], np.cumsum(wide)))
+    means = np.bincount(line, values[order]) / np.bincount(line)
+    # each line holds many points, and none is missing, or there are no lines
+    steps = np.diff(means)
+    if means.size < 2 or 2 * means.size > values.size or steps.max() > 1.5 * steps.min():
+        return None
+    index = np.arange(means.size) - 0.5 * (means.size - 1)
+    step = float(index @ means / (index @ index))
+    origin = float(means.mean()) + step * float(index[0])
+    of_point = np.empty(values.size, np.intp)
+    of_point[order] = line
+    return _Axis(of_point, means.size, step, (values - origin) / step - of_point)
+
+
+def _off(x: _Axis, y: _Axis) -> tuple[float, float]:
+    """Returns rms and largest distance from the grid, of the axis where it is larger, in steps."""
+    off = [axis.off for axis in (x, y) if axis.off is not None]
+    if not off:
+        return 0.0, 0.0
+    return max(float(np.sqrt(np.mean(each**2))) for each in off), max(float(np.abs(each).max()) for each in off)
+
+
+def _warnings(heights: NDArray[np.float64], x: _Axis, y: _Axis) -> tuple[str, ...]:
+    """Tells how far measured points lie from the grid, and what taking them as its points does to the heights."""
+    if x.off is None or y.off is None:
+        return ()
+    rms, largest = _off(x, y)
+    slope_y, slope_x = np.asarray(np.gradient(heights))
+    error = slope_x[y.index, x.index] * x.off + slope_y[y.index, x.index] * y.off
+    share = float(np.sqrt(np.nanmean(error**2)) / np.nanstd(heights)) if np.nanstd(heights) > 0 else 0.0
+    told = f"points lie beside their grid by {100 * rms:.2g} % of its step (rms; at most {100 * largest:.2g} %)"
+    return (f"{told} and are taken as its points, which changes heights by {100 * share:.2g} % of their rms",)
 
 
 def _row_length(table: NDArray[np.float64]) -> int | None:
@@ -119,7 +207,7 @@ def _step(file: str, axis: str, lines: NDArray[np.float64], rounding: float) -> 
     if step <= 0 or off > _EVEN * step + 0.75 * rounding:
         steps = np.diff(lines)
         found = f"steps along {axis} from {steps.min():.4g} to {steps.max():.4g}"
-        raise fault(file, "three columns that are points of a regular grid", found, "export a matrix")
+        raise fault(file, "three columns that are points of a regular grid", found, _MATRIX)
     return step
 
 

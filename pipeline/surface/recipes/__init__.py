@@ -9,7 +9,6 @@ from typing import assert_never
 
 from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
-from pipeline.surface.recipes import disc, gratings, random, snakes
 from pipeline.surface.recipes.parameters import (
     Blazed,
     CompactDisc,
@@ -34,6 +33,9 @@ def make(recipe: Recipe) -> HeightField:
     Returns heights (ny, nx), um, y upwards.
     Raises ConfigError where the pitch is too coarse for the structure, or the patch too small.
     """
+    # transforms take 0.3 s to import, and parameters are read without them
+    from pipeline.surface.recipes import disc, gratings, random, snakes
+
     match recipe:
         case Mirror() | TiltedMirror():
             return gratings.mirror(recipe)
