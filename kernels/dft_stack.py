@@ -40,9 +40,11 @@ def transform(
     kept: Kept,
     out: NDArray[Any],
     done: Callable[[float], None],
+    first_term: int = 0,
 ) -> NDArray[Any]:
     """Fills `out` (psi, phi, 2, terms), float32 or float64, with mean(T_n(scale h) exp(+2 pi i f.x)).
 
+    n counts from `first_term`.
     x and y count from the middle sample. `done` is called with the completed share of terms. Terms are computed in
     double: a recurrence in single precision would lose n^2 of its digits at |t| = 1.
     """
@@ -63,7 +65,7 @@ def transform(
     )
     mean = out.dtype.type(1.0 / heights_um.size)
     for first in range(0, terms, lanes):
-        start = np.int32(first)
+        start = np.int32(first_term + first)
         program.launch(
             "along_x", (items,), samples, np.float64(scale_per_um), start, *x, np.int32(ny), *scratch, narrow
         )

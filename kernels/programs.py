@@ -6,8 +6,8 @@ from kernels import device
 _MOST_BLOCKS = 16  # of 16 Chebyshev terms
 _MOST_S_NODES = 512
 _MOST_W_TERMS = 136  # a config may ask for 128, and planning looks a few further
-# coefficients under a window along an axis: 1e-12 on a patch of twenty sigma, all that a stack holds, takes 49
-MOST_TAPS = 49
+# coefficients under a window along an axis: 2e-11 on a patch of thirty sigma, the widest of a stack, takes 69
+MOST_TAPS = 69
 
 MOST_PAIRS = 128  # of samples and their mirror images in the first step of a transform: n1 / 2 + 1 of n = n1 n2
 CHANNELS = 3  # X, Y and Z

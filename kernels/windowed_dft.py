@@ -28,7 +28,10 @@ _GRID = np.dtype(
 
 @dataclass(frozen=True)
 class DeviceStack:
-    """A DFT stack on the device, its terms padded to `blocks` whole vectors; else as diffraction.dft_stack has it."""
+    """A DFT stack on the device, its terms padded to `blocks` whole vectors; else as diffraction.dft_stack has it.
+
+    shape: its rows and columns.
+    """
 
     buffer: Any
     decay: Any
@@ -38,6 +41,7 @@ class DeviceStack:
     reach: tuple[int, int]
     half_range_um: float
     band_per_um: tuple[float, float]
+    shape: tuple[int, int]
 
 
 def upload_stack(
@@ -68,7 +72,8 @@ def upload_stack(
         padded = device.empty((rows, columns, 2, blocks * lanes), coefficients.dtype)
         padded[..., :terms], padded[..., terms:] = coefficients, 0.0
         buffer = device.shared(padded)
-    return DeviceStack(buffer, device.upload(decay), grid, terms, blocks, reach, half_range_um, band_per_um)
+    shape = rows, columns
+    return DeviceStack(buffer, device.upload(decay), grid, terms, blocks, reach, half_range_um, band_per_um, shape)
 
 
 def taylor_table(
@@ -130,47 +135,88 @@ def _lines(uvw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.append(begins, len(uvw)).astype(np.int32), directions, order.astype(np.int32)
 
 
+@dataclass(frozen=True)
+class PartOfTerms:
+    """A part of a stack's terms, in vectors: those before it, and those of all parts."""
+
+    before: int
+    all_blocks: int
+
+
 def exact_power(stack: DeviceStack, uvw: np.ndarray, lambda_um: np.ndarray) -> np.ndarray:
-    """|P|^2 (directions, L) from a Chebyshev stack; NaN beyond the scan's Nyquist limits.
+    """|P|^2 (directions, L) of the window in the middle of a whole stack; see `ExactPower`."""
+    rows, columns = stack.shape
+    found = ExactPower(uvw, lambda_um, (np.ones((columns, 1)), np.ones((rows, 1))), in_parts=False)
+    found.add(stack, PartOfTerms(0, stack.blocks))
+    return found.power()
 
-    `uvw` (directions, 3), `lambda_um` (L,). Directions of equal v are cheaper together than apart: a map's rows, five
-    times. One launch: callers choose how many directions they hold at once, and hand over maps in `line_order`.
+
+class ExactPower:
+    """|P|^2 of directions `uvw` (directions, 3) and wavelengths `lambda_um` (L,), of a Chebyshev stack or parts.
+
+    `modes` are the factors (columns, modes), (rows, modes) that stand for the windows. Directions of equal v are
+    cheaper together than apart: a map's rows, five times. One launch for each part: callers choose how many
+    directions they hold at once, and hand over maps in `line_order`.
     """
-    program = programs.exact()
-    first, directions, place = _lines(uvw)
-    lines, groups = len(first) - 1, -(-len(lambda_um) // _WAVELENGTHS)
-    padded = np.pad(lambda_um, (0, groups * _WAVELENGTHS - len(lambda_um)), mode="edge")
-    items = min(lines * groups, _ITEMS_A_UNIT * device.default_device().compute_units)
-    scratch = _scratch(stack.reach[0], stack.blocks)
-    read = [device.upload(a) for a in (first, directions, place, padded)]
-    out = device.empty((len(uvw), groups * _WAVELENGTHS), np.float64)
-    result = device.shared(out)
-    program.launch(
-        "exact_power",
-        (items,),
-        stack.buffer,
-        stack.decay,
-        stack.grid,
-        *(np.int32(n) for n in (stack.blocks, *stack.reach, lines, groups)),
-        *read,
-        np.float64(stack.half_range_um),
-        *(np.float64(f) for f in stack.band_per_um),
-        device.result_buffer(items * scratch * out.itemsize),
-        result,
-    )
-    return device.settle(result, out)[:, : len(lambda_um)]
+
+    def __init__(
+        self, uvw: np.ndarray, lambda_um: np.ndarray, modes: tuple[np.ndarray, np.ndarray], *, in_parts: bool
+    ) -> None:
+        first, directions, place = _lines(uvw)
+        self._lines, self._groups = len(first) - 1, -(-len(lambda_um) // _WAVELENGTHS)
+        self._wavelengths, padding = len(lambda_um), self._groups * _WAVELENGTHS - len(lambda_um)
+        read = first, directions, place, np.pad(lambda_um, (0, padding), mode="edge")
+        self._read = [device.upload(a) for a in read]
+        self._modes = modes
+        count = modes[0].shape[1] * modes[1].shape[1]
+        kept = 16 * len(uvw) * self._groups * _WAVELENGTHS * count if in_parts else 16
+        self._amplitude = device.result_buffer(kept)
+        self._out = device.empty((len(uvw), self._groups * _WAVELENGTHS), np.float64)
+
+    def add(self, stack: DeviceStack, part: PartOfTerms) -> None:
+        """Adds the terms of one part of the stack; parts come in order."""
+        modes_x, modes_y = (factors.shape[1] for factors in self._modes)
+        items = min(self._lines * self._groups, _ITEMS_A_UNIT * device.default_device().compute_units)
+        room = _scratch(stack.reach[0], stack.blocks, part.all_blocks, (modes_x, modes_y))
+        result = device.shared(self._out)
+        programs.exact().launch(
+            "exact_power",
+            (items,),
+            stack.buffer,
+            stack.decay,
+            stack.grid,
+            *(device.upload(factors) for factors in self._modes),
+            *(np.int32(n) for n in (modes_x, modes_y, stack.blocks, part.before, part.all_blocks, *stack.reach)),
+            np.int32(self._lines),
+            np.int32(self._groups),
+            *self._read,
+            np.float64(stack.half_range_um),
+            *(np.float64(f) for f in stack.band_per_um),
+            device.result_buffer(8 * items * room),
+            np.int64(room),
+            self._amplitude,
+            result,
+        )
+        device.settle(result, self._out)
+
+    def power(self) -> np.ndarray:
+        """|P|^2 (directions, L) once all parts were added; NaN beyond the scan's Nyquist limits."""
+        return self._out[:, : self._wavelengths]
 
 
-def _scratch(reach_x: int, blocks: int) -> int:
+def _scratch(reach_x: int, blocks: int, all_blocks: int, modes: tuple[int, int]) -> int:
     """Doubles that a work-item of the power spectrum holds."""
-    return _WAVELENGTHS * (2 * reach_x + 1 + 3) * 2 * LANES * blocks
+    taps = 2 * reach_x + 1
+    return _WAVELENGTHS * 2 * LANES * ((taps + modes[0]) * modes[1] * blocks + 2 * all_blocks)
 
 
-def exact_power_bytes(directions: int, wavelengths: int, reach_x: int, terms: int, units: int) -> int:
-    """Bytes of `exact_power`: its result and the scratch of its work-items on a device with `units` compute units."""
-    return 8 * (
-        directions * (wavelengths + _WAVELENGTHS) + _ITEMS_A_UNIT * units * _scratch(reach_x, -(-terms // LANES))
-    )
+def exact_power_bytes(
+    directions: int, wavelengths: int, reach_x: int, terms: int, units: int, modes: tuple[int, int] = (1, 1)
+) -> int:
+    """Bytes of `ExactPower`: its result and the scratch of its work-items on a device with `units` compute units."""
+    blocks = -(-terms // LANES)
+    scratch = _ITEMS_A_UNIT * units * _scratch(reach_x, blocks, blocks, modes)
+    return 8 * (directions * (wavelengths + _WAVELENGTHS) + scratch)
 
 
 def taylor_table_bytes(nodes: int, terms: int) -> int:

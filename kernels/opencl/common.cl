@@ -22,6 +22,7 @@
 #define PARTS 2     /* the real and the imaginary part */
 #define HALVES 2    /* a tile of azimuths and the tile half a turn on */
 #define DOUBLES 8   /* in a vector of 64 bytes */
+#define MODES 3     /* real factors of coefficients that stand for three windows along an axis */
 
 /* The frequencies of a DFT stack and the coherence window's transform, exp(-f^2 / (2 sigma_f^2)). */
 typedef struct {

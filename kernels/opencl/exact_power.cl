@@ -1,4 +1,4 @@
-/* Exact |P|^2 at given directions and wavelengths, from the Chebyshev stack.
+/* Exact |P|^2 at given directions and wavelengths, from the Chebyshev stack: of one window, or the mean over several.
  *
  *   exp(i s h) = sum_n (2 - [n = 0]) i^n J_n(s H) T_n(h / H),  s = k w     (Jacobi-Anger)
  *   P(f; s)    = sum_n (2 - [n = 0]) i^n J_n(s H) F_n(f)                   F_n of T_n(h/H), Dhillon et al. 2014, eq. 8
@@ -8,6 +8,10 @@
  * rows of a column, is made once and serves every direction whose window holds that column; the outer one is each
  * direction's own. Directions that share f, such as two opposite views of a normal light, share that one too.
  *
+ * The mean over several windows is a sum of |P|^2 over modes, each with real factors of the coefficients
+ * (polar_power_spectrum.cl has the equation); one window is one mode whose factors are 1. A stack that is too large may
+ * come in parts of its terms: every part but the last adds P of each mode to `amplitude`, the last one makes |P|^2.
+ *
  * Every work-item takes its share of all lines and groups of WAVES wavelengths. Arguments; taps = 2 * reach + 1:
  *
  * exact_power
@@ -15,7 +19,13 @@
  *                                                              zero beyond the last
  *   decay       double[taps_x + taps_y]     1     g at j spacings, j = -reach .. reach, of x, then of y
  *   grid        Grid                        1/um  frequencies of the stack and the window's width
- *   blocks      int                         1     vectors of terms
+ *   mode_x      double[columns][modes_x]    1     factor of each mode at the stack's columns
+ *   mode_y      double[rows][modes_y]       1     and at its rows
+ *   modes_x     int                         1     modes along x
+ *   modes_y     int                         1     and along y
+ *   blocks      int                         1     vectors of terms in this part of the stack
+ *   before      int                         1     vectors of terms in the parts before it
+ *   all_blocks  int                         1     vectors of terms in all parts
  *   reach_x     int                         1     coefficients on either side of the nearest, along x
  *   reach_y     int                         1     and along y
  *   lines       int                         1     of directions
@@ -27,7 +37,10 @@
  *   half_range  double                      um    H
  *   fx_max      double                      1/um  Nyquist limit of the scan along x
  *   fy_max      double                      1/um  and along y
- *   scratch     double[work-items][WAVES * (taps_x + 3) * 2 * DOUBLES * blocks]   1   of `line_power`
+ *   scratch     double[work-items][room]    1     of `line_power`
+ *   room        long                            1     WAVES * 2 * DOUBLES * ((taps_x + modes_x) * modes_y * blocks + 2 * all_blocks)
+ *   amplitude   double[directions][groups][WAVES][modes_y * modes_x][2]   1   P of each mode, of the parts before; none
+ *                                                                            where one part is all
  *   power       double[directions][WAVES * groups]   1   result: |P|^2, 1 for a mirror at f = 0; NaN beyond the Nyquist
  *                                                        limits
  *
@@ -112,9 +125,9 @@ static APART void bessel_factors(double8 z, const int terms, __global double *j,
     }
 }
 
-/* |sum_n i^n factors_n F_n|^2, F_n conjugated where turn is -1: h is real, so P(-f; s) has conjugate coefficients. */
-static APART double power_of(__global const double *f_n, __global const double *factors, const int blocks,
-                             const double turn) {
+/* sum_n i^n factors_n F_n, F_n conjugated where turn is -1: h is real, so P(-f; s) has conjugate coefficients. */
+static APART double2 amplitude_of(__global const double *f_n, __global const double *factors, const int blocks,
+                                  const double turn) {
     double8 re = 0.0, im = 0.0;
     ROLLED for (int b = 0; b < blocks; ++b) {
         const double8 factor = vload8(b, factors);
@@ -124,8 +137,21 @@ static APART double power_of(__global const double *f_n, __global const double *
     im *= turn;
     /* i^n = cosine + i sine */
     const double8 cosine = (double8)(1, 0, -1, 0, 1, 0, -1, 0), sine = (double8)(0, 1, 0, -1, 0, 1, 0, -1);
-    const double p_re = total(cosine * re - sine * im), p_im = total(cosine * im + sine * re);
-    return p_re * p_re + p_im * p_im;
+    return (double2)(total(cosine * re - sine * im), total(cosine * im + sine * re));
+}
+
+/* The sum over modes of |P|^2, with P of the parts before; 0 before the last part, while P is kept. */
+static APART double power_of(__global const double *f_n, __global const double *factors, const int blocks,
+                             const int modes, const double turn, const int is_first, const int is_last,
+                             __global double *amplitude) {
+    double sum = 0.0;
+    ROLLED for (int m = 0; m < modes; ++m) {
+        double2 p = amplitude_of(f_n + m * PARTS * DOUBLES * blocks, factors, blocks, turn);
+        if (!is_first) p += vload2(m, amplitude);
+        if (is_last) sum += dot(p, p);
+        else vstore2(p, m, amplitude);
+    }
+    return sum;
 }
 
 /* w of the first direction after `d` that has another than it, or the same where none has. */
@@ -135,33 +161,57 @@ static double next_w(__global const double4 *directions, const int d, const int 
     return directions[d].z;
 }
 
-/* F_n of one wavelength, from the window that begins at (row, column): sums over rows of the columns from `fresh` on,
- * which the ring does not hold yet, then the sum over all of the window's columns. Column c is at c % taps_x of the
- * ring. */
-static APART void gather(__global const double *stack, const int columns, const int width, const int row,
-                         const int column, const int fresh, const int taps_x, const int taps_y, const double4 *along_x,
-                         const double4 *along_y, const int lane, __global double *ring, __global double *f_n) {
-    ROLLED for (int c = max(column, fresh); c < column + taps_x; ++c)
-        weighted_sum(stack + ((long)row * columns + c) * width, (long)columns * width, 0, along_y, lane, taps_y, width,
-                     ring + c % taps_x * width);
-    weighted_sum(ring, width, column % taps_x, along_x, lane, taps_x, width, f_n);
+/* The weights of each mode, [mode][tap]: those of the window times the mode's factors from `first` on. */
+static APART void mode_weights(const double4 *weight, const int4 first, __global const double *mode, const int modes,
+                               const int taps, double4 *weights) {
+    ROLLED for (int m = 0; m < modes; ++m)
+        ROLLED for (int t = 0; t < taps; ++t) {
+            const int4 at = (first + t) * modes + m;
+            weights[m * taps + t] = weight[t] * (double4)(mode[at.x], mode[at.y], mode[at.z], mode[at.w]);
+        }
 }
+
+/* F_n of one wavelength and every pair of modes, from the window that begins at (row, column): sums over rows of the
+ * columns from `fresh` on, which the ring does not hold yet, then the sum over all of the window's columns. Column c is
+ * at c % taps_x of the ring, of which each mode along y has one. */
+static APART void gather(__global const double *stack, const int columns, const int width, const int row,
+                         const int column, const int fresh, const int taps_x, const int taps_y, const int modes_x,
+                         const int modes_y, const double4 *along_x, const double4 *along_y, const int lane,
+                         __global double *ring, __global double *f_n) {
+    ROLLED for (int c = max(column, fresh); c < column + taps_x; ++c)
+        ROLLED for (int m = 0; m < modes_y; ++m)
+            weighted_sum(stack + ((long)row * columns + c) * width, (long)columns * width, 0, along_y + m * taps_y,
+                         lane, taps_y, width, ring + (m * taps_x + c % taps_x) * width);
+    ROLLED for (int m = 0; m < modes_y * modes_x; ++m)
+        weighted_sum(ring + m / modes_x * taps_x * width, width, column % taps_x, along_x + m % modes_x * taps_x, lane,
+                     taps_x, width, f_n + m * width);
+}
+
+/* What is known of the stack's modes and of the part of its terms that is at hand. */
+typedef struct {
+    int modes_x, modes_y, blocks, before, all_blocks, reach_x, reach_y;
+} Part;
 
 /* One line, directions[begin .. end - 1], at the wavelengths of a group. `scratch` holds for each wavelength a ring of
  * columns whose rows are summed, and F_n; then what multiplies F_n, for W_AHEAD values of w; and J_n. */
 static APART void line_power(__global const double *stack, __global const double *decay, const Grid grid,
-                             const int blocks, const int reach_x, const int reach_y, const int begin, const int end,
-                             __global const double4 *directions, __global const int *place, const double4 lambda_um,
-                             const double half_range, const double fx_max, const double fy_max,
-                             __global double *scratch, __global double *power, const long stride) {
-    const int taps_x = 2 * reach_x + 1, taps_y = 2 * reach_y + 1, terms = DOUBLES * blocks, width = PARTS * terms;
-    __global double *const rings = scratch, *const f_n = rings + WAVES * taps_x * width;
-    __global double *const factors = f_n + WAVES * width, *const j_n = factors + W_AHEAD * WAVES * terms;
-    double4 along_x[MOST_TAPS], along_y[MOST_TAPS];
+                             __global const double *mode_x, __global const double *mode_y, const Part part,
+                             const int begin, const int end, __global const double4 *directions,
+                             __global const int *place, const double4 lambda_um, const double half_range,
+                             const double fx_max, const double fy_max, __global double *scratch,
+                             __global double *amplitude, __global double *power, const long stride) {
+    const int taps_x = 2 * part.reach_x + 1, taps_y = 2 * part.reach_y + 1, terms = DOUBLES * part.all_blocks;
+    const int width = PARTS * DOUBLES * part.blocks, modes = part.modes_x * part.modes_y;
+    const int ring_size = part.modes_y * taps_x * width;
+    __global double *const rings = scratch, *const f_n = rings + WAVES * ring_size;
+    __global double *const factors = f_n + WAVES * modes * width, *const j_n = factors + W_AHEAD * WAVES * terms;
+    double4 window[MOST_TAPS], along_x[MODES * MOST_TAPS], along_y[MODES * MOST_TAPS];
 
     const double4 fy = directions[begin].y / lambda_um, nearest_y = rint(fy / grid.dfy);
-    window_weights(fy - nearest_y * grid.dfy, grid.dfy, grid.inverse_2_variance, decay + taps_x, reach_y, along_y);
-    const int4 row = convert_int4(nearest_y) - reach_y + grid.row_zero;
+    window_weights(fy - nearest_y * grid.dfy, grid.dfy, grid.inverse_2_variance, decay + taps_x, part.reach_y, window);
+    const int4 inside_y = convert_int4(fabs(fy) <= fy_max);
+    const int4 row = select((int4)0, convert_int4(nearest_y) - part.reach_y + grid.row_zero, inside_y);
+    mode_weights(window, row, mode_y, part.modes_y, taps_y, along_y);
     int4 fresh = 0;
     int known = 0;
     /* w is negative and u is not: nothing is known yet */
@@ -180,20 +230,26 @@ static APART void line_power(__global const double *stack, __global const double
                            factors);
         }
         const double4 fx = u / lambda_um, nearest_x = rint(fx / grid.dfx);
-        const int4 column = convert_int4(nearest_x) - reach_x + grid.column_zero;
-        const int4 inside = convert_int4(fx <= fx_max && fabs(fy) <= fy_max);
+        const int4 inside = inside_y & convert_int4(fx <= fx_max);
+        const int4 column =
+            select((int4)0, convert_int4(nearest_x) - part.reach_x + grid.column_zero, convert_int4(fx <= fx_max));
         const int same_f = u == u_before;
-        if (!same_f)
-            window_weights(fx - nearest_x * grid.dfx, grid.dfx, grid.inverse_2_variance, decay, reach_x, along_x);
+        if (!same_f) {
+            window_weights(fx - nearest_x * grid.dfx, grid.dfx, grid.inverse_2_variance, decay, part.reach_x, window);
+            mode_weights(window, column, mode_x, part.modes_x, taps_x, along_x);
+        }
         double found[WAVES];
         ROLLED for (int lane = 0; lane < WAVES; ++lane) {
             found[lane] = NAN;
             if (!((const int *)&inside)[lane]) continue;
             if (!same_f)
                 gather(stack, grid.columns, width, ((const int *)&row)[lane], ((const int *)&column)[lane],
-                       ((const int *)&fresh)[lane], taps_x, taps_y, along_x, along_y, lane,
-                       rings + lane * taps_x * width, f_n + lane * width);
-            found[lane] = power_of(f_n + lane * width, factors + (WAVES * known + lane) * terms, blocks, turn);
+                       ((const int *)&fresh)[lane], taps_x, taps_y, part.modes_x, part.modes_y, along_x, along_y, lane,
+                       rings + lane * ring_size, f_n + lane * modes * width);
+            found[lane] = power_of(f_n + lane * modes * width,
+                                   factors + (WAVES * known + lane) * terms + DOUBLES * part.before, part.blocks, modes,
+                                   turn, part.before == 0, part.before + part.blocks == part.all_blocks,
+                                   amplitude + (place[d] * stride + lane) * modes * PARTS);
         }
         vstore4(vload4(0, found), 0, power + place[d] * stride);
         fresh = column + taps_x;
@@ -201,18 +257,21 @@ static APART void line_power(__global const double *stack, __global const double
     }
 }
 
-__kernel void exact_power(__global const double *stack, __global const double *decay, const Grid grid, const int blocks,
+__kernel void exact_power(__global const double *stack, __global const double *decay, const Grid grid,
+                          __global const double *mode_x, __global const double *mode_y, const int modes_x,
+                          const int modes_y, const int blocks, const int before, const int all_blocks,
                           const int reach_x, const int reach_y, const int lines, const int groups,
                           __global const int *first, __global const double4 *directions, __global const int *place,
                           __global const double *lambda_um, const double half_range, const double fx_max,
-                          const double fy_max, __global double *scratch, __global double *power) {
+                          const double fy_max, __global double *scratch, const long room, __global double *amplitude,
+                          __global double *power) {
     const long item = get_global_id(0), items = get_global_size(0), tasks = (long)lines * groups;
-    const int scratch_size = WAVES * (2 * reach_x + 1 + 3) * PARTS * DOUBLES * blocks;
+    const Part part = {modes_x, modes_y, blocks, before, all_blocks, reach_x, reach_y};
     /* neighbouring wavelengths of a line ask for the same coefficients, one after the other */
     ROLLED for (long task = item * tasks / items; task < (item + 1) * tasks / items; ++task) {
         const int line = task / groups, group = task % groups;
-        line_power(stack, decay, grid, blocks, reach_x, reach_y, first[line], first[line + 1], directions, place,
-                   vload4(group, lambda_um), half_range, fx_max, fy_max, scratch + item * scratch_size,
-                   power + WAVES * group, WAVES * groups);
+        line_power(stack, decay, grid, mode_x, mode_y, part, first[line], first[line + 1], directions, place,
+                   vload4(group, lambda_um), half_range, fx_max, fy_max, scratch + item * room,
+                   amplitude + WAVES * group * modes_x * modes_y * PARTS, power + WAVES * group, WAVES * groups);
     }
 }

@@ -1,10 +1,14 @@
-/* Polar power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2, from the Chebyshev stack.
+/* Polar power spectrum E(r, phi, s) = |P(r (cos phi, sin phi); s)|^2, from the Chebyshev stack, or its mean over windows.
  *
  *   P(f; s) = sum_n (2 - [n = 0]) i^n J_n(s H) F_n(f),  s = k w          (Jacobi-Anger; F_n as in eq. 8 of
  *                                                                          Dhillon et al. 2014, of T_n(h/H))
  *
  * With A the sum over even n and i B that over odd n, P(f) = A + i B; heights are real, so F_n(-f) is the conjugate
  * and |P(-f)| = |A - i B|: both half turns come from one gather.
+ *
+ * A window at a distance a from the middle multiplies coefficients by exp(-2 pi i f a). For windows at -a and a,
+ *   |sum F exp(-2 pi i f a)|^2 + |sum F exp(2 pi i f a)|^2 = 2 |sum F cos(2 pi f a)|^2 + 2 |sum F sin(2 pi f a)|^2
+ * so the mean over three windows along an axis is a sum of |P|^2 over MODES, each with real factors of its own.
  *
  * Sums are float: T_n and J_n are bounded by 1, nothing cancels. Positions are double: f / df has 4 digits before
  * the point. One work-item, one radius and the LANES azimuths of a tile. Arguments; taps = 2 * reach + 1:
@@ -27,12 +31,32 @@
  *   spectrum  float[HALVES * tiles][radii][s_nodes][LANES]   1   result: E of the tiles of the half turn, then of those
  *                                                          half a turn on; azimuths of a tile side by side
  *
+ * mean_power_spectrum
+ *   stack     float[rows][columns][2][LANES * blocks]   1   F_n: real and imaginary parts, terms side by side
+ *   decay     float[taps_x + taps_y]                 1     the window's transform at j spacings, of x, then of y
+ *   grid      Grid                                   1/um  frequencies of the stack and the window's width
+ *   mode_x    float[columns][MODES]                  1     factor of each mode at the stack's columns
+ *   mode_y    float[rows][MODES]                     1     and at its rows
+ *   radius    double[radii]                          1/um  r
+ *   radii     int                                    1     of E
+ *   azimuth   double[tiles][2][LANES]                1     cos phi, then sin phi, of half a turn
+ *   series    float[LANES * blocks][s_nodes]         1     (-1)^floor(n/2) (2 - [n = 0]) J_n(s H), zero beyond the last
+ *   terms     int                                    1     of the series, even
+ *   blocks    int                                    1     vectors of terms in the stack
+ *   s_nodes   int                                    1     nodes in s
+ *   reach_x   int                                    1     coefficients on either side of the nearest, along x
+ *   reach_y   int                                    1     and along y
+ *   fx_max    double                                 1/um  Nyquist limit of the scan along x: E = 0 beyond it
+ *   fy_max    double                                 1/um  and along y
+ *   spectrum  float[HALVES * tiles][radii][s_nodes][LANES]   1   result: as above
+ *
  * Set by the host: LANES, 16; USUAL_TAPS, the width of a window whose loop along x is written out; MOST_BLOCKS and
  * MOST_TAPS, which bound what a work-item keeps.
  */
 
 #include "common.cl"
 #define CELL (PARTS * LANES) /* floats of a cell of the stack, for each block of terms */
+#define PAIRS (MODES * MODES) /* of a mode along x and one along y */
 
 /* E is larger than caches: lines written past them need not be read first. */
 #if defined(__has_builtin)
@@ -204,4 +228,119 @@ __kernel void polar_power_spectrum(__global const float *stack, __global const f
     float16 f_n[PARTS * MOST_BLOCKS * LANES];
     gather_tile(stack, grid.columns, blocks, 2 * reach_x + 1, 2 * reach_y + 1, &window, f_n);
     power_at_nodes(f_n, f_n + LANES * blocks, window.turned, terms, s_nodes, series, here, opposite);
+}
+
+/* The weights of each mode: those of the window times the mode's factors at the coefficients of every azimuth. */
+static APART void mode_weights(const float16 *weight, const int16 first, __global const float *mode, const int taps,
+                               float16 (*weights)[MOST_TAPS]) {
+    ROLLED for (int t = 0; t < taps; ++t) {
+        float16 factor[MODES];
+        ROLLED for (int lane = 0; lane < LANES; ++lane) {
+            __global const float *here = mode + (((const int *)&first)[lane] + t) * MODES;
+            UNROLL for (int m = 0; m < MODES; ++m) ((float *)&factor[m])[lane] = here[m];
+        }
+        UNROLL for (int m = 0; m < MODES; ++m) weights[m][t] = factor[m] * weight[t];
+    }
+}
+
+/* A row's sums along x of one block of terms, for every mode: row[mode][part]. */
+static INLINE void row_modes(__global const float *row, const int cell, const int taps_x, const int lane,
+                             const float16 (*along_x)[MOST_TAPS], float16 (*sum)[PARTS]) {
+    float16 re[MODES], im[MODES];
+    UNROLL for (int m = 0; m < MODES; ++m) re[m] = im[m] = 0.0f;
+    ROLLED for (int s = 0; s < taps_x; ++s) {
+        const float16 f_re = vload16(0, row + s * cell), f_im = vload16(0, row + s * cell + cell / PARTS);
+        UNROLL for (int m = 0; m < MODES; ++m) {
+            const float16 weight = ((const float *)&along_x[m][s])[lane];
+            re[m] = fma(weight, f_re, re[m]);
+            im[m] = fma(weight, f_im, im[m]);
+        }
+    }
+    UNROLL for (int m = 0; m < MODES; ++m) {
+        sum[m][0] = re[m];
+        sum[m][1] = im[m];
+    }
+}
+
+/* F_n of one block of terms at one azimuth, for every pair of modes, `stride` vectors apart. */
+static APART void gather_modes(__global const float *corner, const int columns, const int cell, const int taps_x,
+                               const int taps_y, const float16 (*weights)[MODES][MOST_TAPS], const int lane,
+                               const int stride, const int part_stride, float16 *f_n) {
+    float16 sum[PAIRS][PARTS];
+    ROLLED for (int p = 0; p < PAIRS; ++p) sum[p][0] = sum[p][1] = 0.0f;
+    ROLLED for (int t = 0; t < taps_y; ++t) {
+        float16 row[MODES][PARTS];
+        row_modes(corner + (long)t * columns * cell, cell, taps_x, lane, weights[0], row);
+        UNROLL for (int p = 0; p < PAIRS; ++p) {
+            const float16 weight = ((const float *)&weights[1][p / MODES][t])[lane];
+            sum[p][0] = fma(weight, row[p % MODES][0], sum[p][0]);
+            sum[p][1] = fma(weight, row[p % MODES][1], sum[p][1]);
+        }
+    }
+    ROLLED for (int p = 0; p < PAIRS; ++p) {
+        f_n[p * stride] = sum[p][0];
+        f_n[p * stride + part_stride] = sum[p][1];
+    }
+}
+
+/* |P|^2 of all pairs of modes at one node in s, at the azimuths of a tile and at the opposite ones. */
+static APART void mean_at_node(const float16 *f_n, const int blocks, const int16 turned, const int terms,
+                               const int s_nodes, __global const float *series, __global float *here,
+                               __global float *opposite) {
+    float16 plus = 0.0f, minus = 0.0f;
+    ROLLED for (int p = 0; p < PAIRS; ++p) {
+        const float16 *re = f_n + p * PARTS * blocks * LANES, *im = re + blocks * LANES;
+        float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
+        ROLLED for (int n = 0; n < terms; n += 2) {
+            const float16 even = series[n * s_nodes], odd = series[(n + 1) * s_nodes];
+            even_re = fma(even, re[n], even_re);
+            even_im = fma(even, im[n], even_im);
+            odd_re = fma(odd, re[n + 1], odd_re);
+            odd_im = fma(odd, im[n + 1], odd_im);
+        }
+        const float16 plus_re = even_re - odd_im, plus_im = even_im + odd_re;
+        const float16 minus_re = even_re + odd_im, minus_im = even_im - odd_re;
+        plus += plus_re * plus_re + plus_im * plus_im;
+        minus += minus_re * minus_re + minus_im * minus_im;
+    }
+    STORE(select(plus, minus, turned), here);
+    STORE(select(minus, plus, turned), opposite);
+}
+
+__kernel void mean_power_spectrum(__global const float *stack, __global const float *decay, const Grid grid,
+                                  __global const float *mode_x, __global const float *mode_y,
+                                  __global const double *radius, const int radii, __global const double *azimuth,
+                                  __global const float *series, const int terms, const int blocks, const int s_nodes,
+                                  const int reach_x, const int reach_y, const double fx_max, const double fy_max,
+                                  __global float *spectrum) {
+    const int ring = get_global_id(0), tile = get_global_id(1), tiles = get_global_size(1);
+    const int taps_x = 2 * reach_x + 1, taps_y = 2 * reach_y + 1, cell = CELL * blocks;
+    __global float *here = spectrum + ((long)tile * radii + ring) * s_nodes * LANES;
+    __global float *opposite = here + (long)tiles * radii * s_nodes * LANES;
+
+    Window window;
+    place_window(grid, decay, azimuth + 2 * LANES * tile, radius[ring], fx_max, fy_max, reach_x, reach_y, &window);
+    /* beyond the Nyquist limits there may be no coefficients; what is gathered instead is not used */
+    const int16 inside = window.known;
+    const int16 column = select((int16)0, window.first[0], inside), row = select((int16)0, window.first[1], inside);
+    float16 weights[2][MODES][MOST_TAPS];
+    mode_weights(window.weight[0], column, mode_x, taps_x, weights[0]);
+    mode_weights(window.weight[1], row, mode_y, taps_y, weights[1]);
+    /* [pair of modes][part][term][azimuth] */
+    float16 f_n[PAIRS * PARTS * MOST_BLOCKS * LANES];
+    ROLLED for (int lane = 0; lane < LANES; ++lane) {
+        const int known = ((const int *)&inside)[lane];
+        const long first = (long)((const int *)&row)[lane] * grid.columns + ((const int *)&column)[lane];
+        ROLLED for (int b = 0; b < blocks; ++b) {
+            float16 *to = f_n + LANES * b + lane;
+            if (known)
+                gather_modes(stack + first * cell + LANES * b, grid.columns, cell, taps_x, taps_y, weights, lane,
+                             PARTS * blocks * LANES, blocks * LANES, to);
+            else
+                ROLLED for (int p = 0; p < PAIRS * PARTS; ++p) to[p * blocks * LANES] = 0.0f;
+        }
+    }
+    ROLLED for (int block = 0; block < PAIRS * PARTS * blocks; ++block) transpose(f_n + LANES * block);
+    ROLLED for (int j = 0; j < s_nodes; ++j)
+        mean_at_node(f_n, blocks, window.turned, terms, s_nodes, series + j, here + LANES * j, opposite + LANES * j);
 }

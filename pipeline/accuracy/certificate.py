@@ -7,9 +7,9 @@ directions.
 
 from dataclasses import dataclass
 
-from pipeline.accuracy.checks import RandomCheck, RelativeError, check_random, check_reference
+from pipeline.accuracy.checks import RandomCheck, RelativeError, check_table
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import ColourError
 from pipeline.progress import Progress, silent
@@ -35,9 +35,7 @@ class Certificate:
     certifies: str = CERTIFIES
 
 
-def measure(
-    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
-) -> Certificate:
+def measure(interpolate: Evaluator, reference: Reference, config: Config, progress: Progress = silent) -> Certificate:
     """Measures a table against the exact reference of its height field, and the reference against plain sums.
 
     interpolate: computes the table's XYZ for pairs of directions, negative values included.
@@ -54,11 +52,11 @@ def measure(
 
 
 def errors_of(
-    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+    interpolate: Evaluator, reference: Reference, config: Config, progress: Progress = silent
 ) -> Certificate:
     """Measures a table as `measure` does, and refuses no error of the table."""
-    checked = check_reference(reference.fields[0], reference.first, config)
-    random = check_random(interpolate, reference, config, progress)
+    random, checked = check_table(interpolate, reference, config)
+    progress("reference", 1.0)
     exposure = config.accuracy.exposure_ru
     return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, checked)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference, Reference, power_direct
+from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e
@@ -84,7 +84,7 @@ class RandomCheck:
 
 
 def check_random(
-    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
+    interpolate: Evaluator, reference: Reference, config: Config, progress: Progress = silent
 ) -> RandomCheck:
     """Compares a table with the reference on 2000 random directions that its planning did not use.
 
@@ -95,7 +95,10 @@ def check_random(
     """
     wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
     truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
-    interpolated = interpolate(wi, wr)
+    return _compared(interpolate(wi, wr), truth, config, wi, wr)
+
+
+def _compared(interpolated: Array, truth: Array, config: Config, wi: Array, wr: Array) -> RandomCheck:
     found = never_negative(interpolated)
     # Y over that of a mirror is |P|^2, without the material's factors
     mirror = config.radiometry.mirror_luminance(wi, wr)
@@ -122,7 +125,7 @@ class MapCheck:
 
 def check_map(
     evaluate: Evaluator,
-    reference: MeanReference,
+    reference: Reference,
     config: Config,
     light: Array,
     radius: float,
@@ -144,14 +147,19 @@ def check_map(
     return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors)
 
 
-def check_reference(field: HeightField, reference: Reference, config: Config, directions: int = 3) -> RelativeError:
-    """Compares the reference with the plain sum over samples, on a few directions, each at one wavelength.
+def check_table(
+    interpolate: Evaluator, reference: Reference, config: Config, directions: int = 3
+) -> tuple[RandomCheck, RelativeError]:
+    """Compares a table with the reference, as `check_random` does, and the reference with plain sums over samples.
 
-    field: the height field. reference: made of it. config: its light, scene and window are read.
-    directions: number of random directions; a mirror direction is added.
-    Returns relative errors of |P|^2.
-    Raises AccuracyError where they differ by more than 1e-9 of the mirror, because then no error that is measured
-    against the reference can be trusted.
+    The sums are those of the window in the middle, on a few directions, each at one wavelength. The reference answers
+    for both at once, because it may have to make its stack for every answer.
+
+    interpolate, reference: as in `check_random`. config: its light, material, scene, window and exposure are read.
+    directions: number of random directions of the sums; a mirror direction is added.
+    Returns the errors of the table, and relative errors of |P|^2 of the reference.
+    Raises AccuracyError where the two algorithms of the reference differ by more than 1e-9 of the mirror, because
+    then no error that is measured against the reference can be trusted.
     """
     wi, wr = random_pairs(config.scene, directions, _SEED + 1)
     # the mirror direction lies within the Nyquist limits of every scan
@@ -159,15 +167,18 @@ def check_reference(field: HeightField, reference: Reference, config: Config, di
     nodes = trapezoid(config.light, 100.0).lambda_nm
     direction = np.arange(len(uvw))
     node = direction % len(nodes)
-    direct = _direct_sums(field, config.coherence.sigma_um, uvw, nodes[node])
+    wi, wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
+    truth, middle = reference.xyz_and_middle(config.light, config.material, wi, wr, uvw, nodes)
+    fast = middle[direction, node]
+    direct = _direct_sums(reference.field, config.coherence.sigma_um, uvw, nodes[node])
     known = np.isfinite(direct)
-    fast = reference.power(uvw, nodes)[direction, node]
     if np.max(np.abs(fast - direct)[known]) > _REFERENCE_TOLERANCE:
         raise AccuracyError(
             f"the two algorithms of the exact reference differ by {np.max(np.abs(fast - direct)[known]):.1e} of the "
             f"mirror, more than {_REFERENCE_TOLERANCE:g}; please report this config"
         )
-    return relative_error(fast[known], direct[known], MIRROR_FLOOR)
+    checked = relative_error(fast[known], direct[known], MIRROR_FLOOR)
+    return _compared(interpolate(wi, wr), truth, config, wi, wr), checked
 
 
 def _direct_sums(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.accuracy.checks import MAP_RADIUS
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.optics.colour import delta_e
 from pipeline.tables.evaluate import Evaluator, Map
 
@@ -36,7 +36,7 @@ Study = Sequence[Callable[[], Curve]]
 class CoarseMap:
     """A coarse map under one light, with the reference's XYZ."""
 
-    def __init__(self, reference: MeanReference, config: Config, light: Array, radius: float) -> None:
+    def __init__(self, reference: Reference, config: Config, light: Array, radius: float) -> None:
         """Computes the reference on the map.
 
         reference: of the height field. config: its light, material and exposure are read.

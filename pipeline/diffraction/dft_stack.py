@@ -8,7 +8,7 @@ Two series have one form, sum_n c_n(k w) term_n(t) with t = h / H in [-1, 1]:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import floor
+from math import floor, sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 from kernels import device, dft_stack
 from kernels.dft_stack import Kept
 from pipeline import resources
+from pipeline.arrays import Array
 from pipeline.diffraction.device import require_device
 from pipeline.errors import AccuracyError
 from pipeline.fourier import term_transforms
@@ -24,10 +25,13 @@ from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
 from pipeline.progress import Progress, silent
 from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import Places
 
 Basis = Literal["taylor", "chebyshev"]
 # the sum over samples then differs from the window's integral by 1e-12 of it
 LEAST_SIGMA_PITCHES = 1.2
+# a wider patch has more coefficients under a window than kernels hold
+_WIDEST_SIGMAS = 30.0
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ class Stack:
 class StackSize:
     """The size of a stack, known before it is built: samples that are transformed, coefficients that are kept.
 
-    samples: (ny, nx) within 8.5 sigma of the middle. kept: indices of the coefficients.
+    samples: (ny, nx) that are transformed. kept: indices of the coefficients.
     spacing_per_um, reach: as in `Stack`.
     """
 
@@ -99,9 +103,11 @@ class StackSize:
         }
 
 
-def size(extent: Extent, sigma_um: float, frequency_max_per_um: float, tolerance: float) -> StackSize:
+def size(
+    extent: Extent, sigma_um: float, frequency_max_per_um: float, tolerance: float, *, whole: bool = False
+) -> StackSize:
     """Chooses the samples and the coefficients of a stack; the parameters are those of `build`."""
-    samples = _kept_samples(extent, sigma_um)
+    samples = extent.shape if whole else samples_seen(extent, sigma_um, tolerance)
     spacing = 1.0 / (samples[1] * extent.pitch_um[0]), 1.0 / (samples[0] * extent.pitch_um[1])
     reach = window_reach(spacing, sigma_um, tolerance)
     phi_max, psi_max = (
@@ -120,6 +126,9 @@ def build(
     tolerance: float,
     progress: Progress = silent,
     dtype: DTypeLike = np.float64,
+    *,
+    whole: bool = False,
+    first_term: int = 0,
 ) -> Stack:
     """Transforms the terms of a series ([D14] eq. 5-7 for the Taylor series).
 
@@ -128,24 +137,28 @@ def build(
     field: heights of the whole patch. basis: the series. terms: number of terms.
     sigma_um: standard deviation of the coherence window, um.
     frequency_max_per_um: highest |f| of interest, 1/um; frequencies above the Nyquist limits are omitted in any case.
-    tolerance: amplitude, relative to its peak, at which the window's transform is cut.
+    tolerance: amplitude, relative to its peak, at which the window and its transform are cut.
     progress: called with the share done. dtype: float32 or float64.
+    whole: whether samples beyond the window in the middle are transformed, too, as windows elsewhere need them.
+    first_term: order of the first term, a multiple of 8; 0 for a Taylor series.
     Returns the stack. Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does
     not fit into memory, and DeviceError if a Chebyshev stack is asked for and no device works.
     """
     _check_window(sigma_um, field.pitch_um)
     # centred after the crop, because the mid-range of the part may differ from that of the whole patch
-    chosen = size(field.extent, sigma_um, frequency_max_per_um, tolerance)
+    chosen = size(field.extent, sigma_um, frequency_max_per_um, tolerance, whole=whole)
     kept, reach = chosen.kept, chosen.reach
-    field = crop_to_window(field, sigma_um).centred()
+    field = _middle(field, chosen.samples).centred()
     resources.require(
         f"the stack of {terms} terms on {kept.shape[0]} x {kept.shape[1]} frequencies",
         chosen.stack_bytes(terms, np.dtype(dtype).itemsize),
         "use a smaller coherence.sigma_um, a smaller patch or fewer terms",
     )
-    transform = _taylor if basis == "taylor" else _chebyshev
     values = device.empty((*kept.shape, 2, terms), dtype)
-    transform(field, kept, values, progress)
+    if basis == "taylor":
+        _taylor(field, kept, values, progress)
+    else:
+        _chebyshev(field, kept, values, first_term, progress)
     return Stack(
         basis,
         values,
@@ -174,10 +187,11 @@ def _powers(t: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
         power *= t
 
 
-def _chebyshev(field: HeightField, kept: Kept, out: NDArray[Any], progress: Progress) -> None:
+def _chebyshev(field: HeightField, kept: Kept, out: NDArray[Any], first_term: int, progress: Progress) -> None:
     """Transforms T_n(t) by a kernel. Raises DeviceError if no device works."""
     require_device()
-    dft_stack.transform(field.heights_um, scale_per_um(field), kept, out, lambda done: progress("stack", done))
+    heights, scale = field.heights_um, scale_per_um(field)
+    dft_stack.transform(heights, scale, kept, out, lambda done: progress("stack", done), first_term)
 
 
 def scale_per_um(field: HeightField) -> float:
@@ -197,29 +211,77 @@ def _check_window(sigma_um: float, pitch_um: tuple[float, float]) -> None:
         )
 
 
-def crop_to_window(field: HeightField, sigma_um: float) -> HeightField:
-    """Cuts the field to the samples that contribute: beyond 8.5 sigma the window is below float64's rounding.
+def crop_to_window(field: HeightField, sigma_um: float, tolerance: float) -> HeightField:
+    """Cuts the field to the samples at which the window in the middle exceeds `tolerance` of its peak.
 
     sigma_um: standard deviation of the coherence window, um. Returns the middle part of the field.
     """
-    ny, nx = field.shape
-    keep_y, keep_x = _kept_samples(field.extent, sigma_um)
+    return _middle(field, samples_seen(field.extent, sigma_um, tolerance))
+
+
+def _middle(field: HeightField, samples: tuple[int, int]) -> HeightField:
+    (ny, nx), (keep_y, keep_x) = field.shape, samples
     # the middle sample remains at index n // 2
     x, y = nx // 2 - keep_x // 2, ny // 2 - keep_y // 2
     return HeightField(field.heights_um[y : y + keep_y, x : x + keep_x], field.pitch_um)
 
 
-def _kept_samples(extent: Extent, sigma_um: float) -> tuple[int, int]:
-    """Computes the samples (ny, nx) within 8.5 sigma of the middle."""
+def samples_seen(extent: Extent, sigma_um: float, tolerance: float) -> tuple[int, int]:
+    """Computes the samples (ny, nx) at which the window in the middle exceeds `tolerance` of its peak.
+
+    The samples beyond hold less than `tolerance` of the window's sum.
+    """
     from scipy.fft import next_fast_len
 
     (ny, nx), (pitch_x, pitch_y) = extent.shape, extent.pitch_um
+    reach_um = min(reach_sigmas(tolerance), BLIND_SIGMAS) * sigma_um
     # lengths that are products of small primes are fast to transform
     keep_y, keep_x = (
-        min(n, next_fast_len(2 * int(np.ceil(BLIND_SIGMAS * sigma_um / pitch)) + 2, real=True))
+        min(n, next_fast_len(2 * int(np.ceil(reach_um / pitch)) + 2, real=True))
         for n, pitch in ((ny, pitch_y), (nx, pitch_x))
     )
     return keep_y, keep_x
+
+
+def serves_all(extent: Extent, sigma_um: float, tolerance: float, windows: int) -> bool:
+    """Says whether one stack of the whole patch is less work for several windows than a stack of each.
+
+    The work of a stack grows with its samples, and so does the number of coefficients under a window.
+    """
+    ny, nx = samples_seen(extent, sigma_um, tolerance)
+    is_narrow = max(extent.size_um) <= _WIDEST_SIGMAS * sigma_um
+    return windows > 1 and is_narrow and 2 * extent.samples <= windows * ny * nx
+
+
+def modes(built: Stack, places: Places) -> tuple[Array, Array]:
+    """Computes the real factors of coefficients that stand for several windows on the patch of a stack.
+
+    A window at a distance a from the middle multiplies the coefficients by exp(-2 pi i f a). For windows at -a and a,
+    |sum F exp(-2 pi i f a)|^2 + |sum F exp(2 pi i f a)|^2 = 2 |sum F cos(2 pi f a)|^2 + 2 |sum F sin(2 pi f a)|^2:
+    the mean of |P|^2 over the windows is a sum of |P|^2 over modes, each with the factors of one row and column.
+
+    built: a stack of the whole patch. places: the windows; at most one pair and the middle along either axis.
+    Returns the factors at the columns, (columns, modes), and at the rows, (rows, modes).
+    """
+    rows, columns = built.coefficients.shape[:2]
+    along = ((columns, built.column_zero, places.x), (rows, built.row_zero, places.y))
+    x, y = (
+        _modes((np.arange(count, dtype=np.float64) - zero) * (spacing * 0.5 / band), offsets)
+        for (count, zero, offsets), spacing, band in zip(along, built.spacing_per_um, built.band_per_um, strict=True)
+    )
+    return x, y
+
+
+def _modes(turns: Array, offsets: tuple[int, ...]) -> Array:
+    """Computes the factors along one axis; turns: f times the pitch (n,). offsets: of the windows, samples."""
+    farthest = max(offsets)
+    if set(offsets) - {-farthest, 0, farthest}:
+        raise ValueError(f"expected windows at -a, 0 and a, got {offsets}")
+    angle = 2.0 * np.pi * farthest * turns
+    factors = [np.ones_like(turns)] if 0 in offsets else []
+    if farthest:
+        factors += [sqrt(2.0) * np.cos(angle), sqrt(2.0) * np.sin(angle)]
+    return np.stack(factors, axis=-1) / sqrt(len(offsets))
 
 
 def window_tolerance(tolerance: float) -> float:

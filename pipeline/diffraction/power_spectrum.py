@@ -20,6 +20,7 @@ from pipeline.diffraction.upload import upload
 from pipeline.optics.coherence import sigma_f
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import MIDDLE, Places
 
 # distances of radii in sigma_f. At a distance of 1, interpolation on 8 radii errs by up to a tenth of E, which an
 # integral over wavelengths averages out and a laser line does not. Near the origin, where the flank of the specular
@@ -125,18 +126,23 @@ def chebyshev_stack(
     terms: int,
     tolerance: float,
     progress: Progress = silent,
+    *,
+    whole: bool = False,
 ) -> dft_stack.Stack:
     """Builds the float32 Chebyshev stack from which E is gathered.
 
     Its last axis is filled to whole vectors: they cost the same, and the device uses them without a copy.
 
-    field: heights of one window. sigma_um: standard deviation of the coherence window, um.
+    field: heights. sigma_um: standard deviation of the coherence window, um.
     reach_per_um: the largest radius of E, 1/um. terms: number of Chebyshev terms.
-    tolerance: amplitude, relative to its peak, at which the window's transform is cut.
+    tolerance: amplitude, relative to its peak, at which the window and its transform are cut.
+    whole: whether the stack is for windows anywhere on the patch, not for the one in the middle alone.
     Returns the stack. Raises AccuracyError and DeviceError as `dft_stack.build` does.
     """
     filled = filled_terms(terms)
-    built = dft_stack.build(field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32)
+    built = dft_stack.build(
+        field, "chebyshev", filled, sigma_um, reach_per_um, tolerance, progress, np.float32, whole=whole
+    )
     return replace(built, terms=terms)
 
 
@@ -151,12 +157,18 @@ def s_max(lambda_min_nm: float) -> float:
 
 
 def gather(
-    built: dft_stack.Stack, half_turn: Array, radius_per_um: Array, lambda_min_nm: float, nodes: int
+    built: dft_stack.Stack,
+    half_turn: Array,
+    radius_per_um: Array,
+    lambda_min_nm: float,
+    nodes: int,
+    places: Places = MIDDLE,
 ) -> NDArray[np.float32]:
     """Computes E at azimuths of half a turn and at their opposites, by the Jacobi-Anger expansion.
 
     built: a Chebyshev stack. half_turn: azimuths (a,), radians, a multiple of 16. radius_per_um: radii (n_r,), 1/um.
     lambda_min_nm: shortest wavelength, nm, which sets s_max. nodes: number of Chebyshev nodes in s.
+    places: positions of the window; for several, E is the mean over them, and the stack is one of the whole patch.
     Returns E (2 a / 16, n_r, nodes, 16), first the given azimuths, then their opposites. Raises DeviceError if no
     device works.
     """
@@ -166,19 +178,28 @@ def gather(
     # w < 0 makes the argument of the Jacobi-Anger expansion negative, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
     bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
-    return polar_power_spectrum.gather(upload(built), radius_per_um, half_turn, bessel)
+    modes = None
+    if places != MIDDLE:
+        x, y = dft_stack.modes(built, places)
+        modes = polar_power_spectrum.padded(x), polar_power_spectrum.padded(y)
+    return polar_power_spectrum.gather(upload(built), radius_per_um, half_turn, bessel, modes)
 
 
 def build(
-    built: dft_stack.Stack, azimuths: Azimuths, radius_per_um: Array, lambda_min_nm: float, nodes: int
+    built: dft_stack.Stack,
+    azimuths: Azimuths,
+    radius_per_um: Array,
+    lambda_min_nm: float,
+    nodes: int,
+    places: Places = MIDDLE,
 ) -> PolarPowerSpectrum:
     """Computes the power spectrum of a Chebyshev stack for s up to `s_max`.
 
     built: the stack. azimuths: those of the tables. radius_per_um: radii (n_r,), 1/um, ascending from 0.
-    lambda_min_nm: shortest wavelength, nm. nodes: number of Chebyshev nodes in s.
+    lambda_min_nm: shortest wavelength, nm. nodes: number of Chebyshev nodes in s. places: as in `gather`.
     Raises DeviceError if no device works.
     """
-    values = gather(built, azimuths.phi()[: azimuths.count // 2], radius_per_um, lambda_min_nm, nodes)
+    values = gather(built, azimuths.phi()[: azimuths.count // 2], radius_per_um, lambda_min_nm, nodes, places)
     return PolarPowerSpectrum(
         values, radius_per_um, azimuths, s_max(lambda_min_nm), built.sigma_um, built.band_per_um
     )

@@ -8,7 +8,7 @@
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -25,14 +25,18 @@ from pipeline.optics.coherence import folded_window
 from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent
+from pipeline.surface import windows
 from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import MIDDLE, Places
 
 STEP_NM = FINE_STEP_NM
 # relative amplitude at which the series and the window are cut; on 65 um the window takes 9 x 9 coefficients, where
 # 1e-12 would take 11 x 11
 _TOLERANCE = 2e-11
 _DIRECTIONS_AT_ONCE = 8192
+# a larger stack is made in parts of its terms, while P of some directions takes no more than _AMPLITUDE_BYTES
+_HELD_BYTES, _AMPLITUDE_BYTES = 2**29, 2**28
 _ROWS_AT_ONCE = 32
 
 
@@ -118,34 +122,63 @@ def _sums(power: Array, weights: Array) -> Array:
     return np.stack([np.vecdot(power, channel) for channel in weights.T], axis=-1)
 
 
-class Reference:
-    """|P|^2 and XYZ of one height field for any directions, exact to 1e-9 of the mirror.
+@dataclass(frozen=True)
+class Query:
+    """Directions and wavelengths at which |P|^2 is asked for, and the windows over which it is a mean.
 
-    stored_bytes: size of the DFT stack.
+    uvw: (directions, 3). lambda_nm: (L,), nm. places: positions of the window.
+    """
+
+    uvw: Array
+    lambda_nm: Array
+    places: Places
+
+
+class Reference:
+    """The mean of |P|^2 over windows of one height field, and XYZ, for any directions, exact to 1e-9 of the mirror.
+
+    One stack of the whole patch serves all windows where that is less work than a stack of each. A stack of at most
+    512 MiB stays in memory; a larger one is made for every answer, in parts of its terms.
     """
 
     def __init__(
-        self, field: HeightField, sigma_um: float, lambda_min_nm: float, progress: Progress = silent
+        self,
+        field: HeightField,
+        sigma_um: float,
+        lambda_min_nm: float,
+        progress: Progress = silent,
+        places: Places = MIDDLE,
     ) -> None:
-        """Transforms the Chebyshev terms of the height field.
+        """Transforms the Chebyshev terms of the height field, if the stack stays in memory.
 
-        sigma_um: standard deviation of the coherence window, um. lambda_min_nm: shortest wavelength, nm.
+        field: the whole scan. sigma_um: standard deviation of the coherence window, um.
+        lambda_min_nm: shortest wavelength, nm. places: positions of the window.
         Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does not fit into
         memory, and DeviceError if no device works.
         """
-        terms = _terms(field.half_range_um, lambda_min_nm)
-        reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
-        built = dft_stack.build(field, "chebyshev", terms, sigma_um, reachable, _TOLERANCE, progress)
-        self._sigma_um = sigma_um
-        self._stack = upload(built)
-        self.stored_bytes = built.coefficients.nbytes
+        self.field, self._sigma_um, self._lambda_min_nm, self._places = field, sigma_um, lambda_min_nm, places
+        self._size, self._progress = size(field.extent, sigma_um, lambda_min_nm, places), progress
+        self._held: tuple[dft_stack.Stack, windowed_dft.DeviceStack] | None = None
+        if self._size.is_held:
+            built = self._build(field, 0, self._size.terms)
+            self._held = built, upload(built)
+
+    @property
+    def nbytes(self) -> int:
+        """Size in bytes of the height field and of the stack in memory."""
+        return self.field.nbytes + self.stack_bytes
+
+    @property
+    def stack_bytes(self) -> int:
+        """Size in bytes of the stack in memory."""
+        return 0 if self._held is None else self._held[0].coefficients.nbytes
 
     def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """Computes |P|^2 (directions, L), NaN beyond the scan's Nyquist limits.
+        """Computes the mean of |P|^2 over the windows, (directions, L), NaN beyond the scan's Nyquist limits.
 
         uvw: (directions, 3), as many as fit into memory with L. lambda_nm: (L,), nm.
         """
-        return np.asarray(windowed_dft.exact_power(self._stack, uvw, 1e-3 * lambda_nm))
+        return self._answers([Query(uvw, lambda_nm, self._places)])[0]
 
     def xyz(
         self,
@@ -163,53 +196,76 @@ class Reference:
         quadrature = trapezoid(light, step_nm)
         uvw = geometry.uvw(wi, wr)
         order, out = windowed_dft.line_order(uvw), np.empty((len(wr), 3))
-        for tile in _tiles(len(wr)):
+        for tile in self._size.tiles(len(wr), len(quadrature.lambda_nm)):
             these = order[tile]
             power = self.power(uvw[these], quadrature.lambda_nm)
             out[these] = integrate(power, quadrature, material, self._sigma_um, wi[these], wr[these])
             progress("reference", tile.stop / len(wr))
         return out
 
+    def xyz_and_middle(
+        self, light: Light, material: Material, wi: Array, wr: Array, uvw: Array, lambda_nm: Array
+    ) -> tuple[Array, Array]:
+        """Computes XYZ of directions, and |P|^2 of the window in the middle at a few others, from one stack.
 
-class MeanReference:
-    """The mean of |P|^2 over several positions of the coherence window, each computed by its own `Reference`.
-
-    Only the first stays in memory; the others are built again for every call.
-    """
-
-    def __init__(
-        self, fields: Sequence[HeightField], sigma_um: float, lambda_min_nm: float, progress: Progress = silent
-    ) -> None:
-        """Builds the reference of the first window.
-
-        fields: one height field per position of the window (pipeline.surface.windows).
-        sigma_um: standard deviation of the window, um. lambda_min_nm: shortest wavelength, nm.
-        Raises AccuracyError and DeviceError as `Reference` does.
+        light, material, wi, wr: as in `xyz`, as many directions as fit into memory. uvw, lambda_nm: as in `power`.
         """
-        self.fields, self._sigma_um, self._lambda_min_nm, self._progress = fields, sigma_um, lambda_min_nm, progress
-        self.first = Reference(fields[0], sigma_um, lambda_min_nm, progress)
+        quadrature = trapezoid(light, STEP_NM)
+        many = Query(geometry.uvw(wi, wr), quadrature.lambda_nm, self._places)
+        power, middle = self._answers([many, Query(uvw, lambda_nm, MIDDLE)])
+        return integrate(power, quadrature, material, self._sigma_um, wi, wr), middle
 
-    @property
-    def nbytes(self) -> int:
-        """Size in bytes of the height fields and of the reference in memory."""
-        return self.first.stored_bytes + sum(field.nbytes for field in self.fields)
+    def _answers(self, queries: Sequence[Query]) -> list[Array]:
+        """Computes |P|^2 (directions, L) for every query."""
+        if self._size.serves_all:
+            return self._from_one([(query, query.places) for query in queries], self.field)
+        totals: list[Array | None] = [None] * len(queries)
+        for place in dict.fromkeys(place for query in queries for place in query.places.pairs()):
+            asked = [i for i, query in enumerate(queries) if place in query.places.pairs()]
+            found = self._from_one([(queries[i], MIDDLE) for i in asked], self._part_of_patch(place))
+            for i, power in zip(asked, found, strict=True):
+                share = power / queries[i].places.count
+                before = totals[i]
+                totals[i] = share if before is None else before + share
+        return [total for total in totals if total is not None]
 
-    def xyz(self, light: Light, material: Material, wi: Array, wr: Array, progress: Progress = silent) -> Array:
-        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3)."""
-        return self._mean(lambda each: each.xyz(light, material, wi, wr, progress=progress))
+    def _part_of_patch(self, place: tuple[int, int]) -> HeightField:
+        return self.field if place == (0, 0) else windows.around(self.field, place, self._size.stack.samples)
 
-    def power(self, uvw: Array, lambda_nm: Array) -> Array:
-        """Computes |P|^2 (directions, L), NaN beyond the scan's Nyquist limits.
+    def _from_one(self, queries: Sequence[tuple[Query, Places]], field: HeightField) -> list[Array]:
+        """Computes |P|^2 for queries at windows on one field, whose stack is held or made in parts."""
+        is_held, terms = self._held is not None, self._size.terms
+        exact: list[windowed_dft.ExactPower] = []
+        for first in range(0, terms, self._size.terms_at_once):
+            built, stack = self._held or self._uploaded(field, first)
+            part = windowed_dft.PartOfTerms(first // windowed_dft.LANES, terms // windowed_dft.LANES)
+            for query, places in queries[len(exact) :]:
+                modes = dft_stack.modes(built, places)
+                lambda_um = 1e-3 * query.lambda_nm
+                exact.append(windowed_dft.ExactPower(query.uvw, lambda_um, modes, in_parts=not is_held))
+            for each in exact:
+                each.add(stack, part)
+            # its memory serves the next part
+            del built, stack
+        return [each.power() for each in exact]
 
-        uvw: (directions, 3), as many as fit into memory with L. lambda_nm: (L,), nm.
-        """
-        return self._mean(lambda each: each.power(uvw, lambda_nm))
+    def _uploaded(self, field: HeightField, first: int) -> tuple[dft_stack.Stack, windowed_dft.DeviceStack]:
+        built = self._build(field, first, min(self._size.terms_at_once, self._size.terms - first))
+        return built, upload(built)
 
-    def _mean(self, answer: Callable[[Reference], Array]) -> Array:
-        total = answer(self.first)
-        for field in self.fields[1:]:
-            total = total + answer(Reference(field, self._sigma_um, self._lambda_min_nm, self._progress))
-        return total / len(self.fields)
+    def _build(self, field: HeightField, first: int, terms: int) -> dft_stack.Stack:
+        reachable = expansion.W_MAX / (1e-3 * self._lambda_min_nm)
+        return dft_stack.build(
+            field,
+            "chebyshev",
+            terms,
+            self._sigma_um,
+            reachable,
+            _TOLERANCE,
+            self._progress,
+            whole=self._size.serves_all,
+            first_term=first,
+        )
 
 
 def _terms(half_range_um: float, lambda_min_nm: float) -> int:
@@ -220,64 +276,95 @@ def _terms(half_range_um: float, lambda_min_nm: float) -> int:
 
 @dataclass(frozen=True)
 class ReferenceSize:
-    """The size of a `MeanReference`, known before it is made.
+    """The size of a `Reference`, known before it is made.
 
-    terms: of its series. stack: size of its stacks. windows: positions of the coherence window. extent: of the
-    height field.
+    terms: of its series. stack: size of its stack. serves_all: whether that is one of the whole patch for all
+    windows. places: positions of the coherence window. extent: of the height field.
     """
 
     terms: int
     stack: dft_stack.StackSize
-    windows: int
+    serves_all: bool
+    places: Places
     extent: Extent
 
     @property
+    def is_held(self) -> bool:
+        """Whether the stack stays in memory."""
+        is_one = self.serves_all or self.places == MIDDLE
+        return is_one and self.stack.stack_bytes(self.terms, 8) <= _HELD_BYTES
+
+    @property
+    def terms_at_once(self) -> int:
+        """Terms of a part of the stack: all, or one vector of them."""
+        return self.terms if self.is_held else windowed_dft.LANES
+
+    @property
+    def part_bytes(self) -> int:
+        """Bytes of a part of the stack."""
+        return self.stack.stack_bytes(self.terms_at_once, 8)
+
+    @property
     def nbytes(self) -> int:
-        """Bytes of its stack and of the height field of every window."""
-        return self.stack.stack_bytes(self.terms, 8) + self.windows * self.extent.bytes
+        """Bytes that stay in memory: of its stack, if that is held, and of the height field."""
+        return self.extent.bytes + (self.part_bytes if self.is_held else 0)
+
+    @property
+    def _modes(self) -> tuple[int, int]:
+        return (len(self.places.x), len(self.places.y)) if self.serves_all else (1, 1)
+
+    def _amplitude_bytes(self, directions: int, wavelengths: int) -> int:
+        """Computes the size of P of all modes, which is kept while parts of the stack are made, bytes."""
+        return 0 if self.is_held else 16 * directions * (wavelengths + 3) * self._modes[0] * self._modes[1]
+
+    def tiles(self, directions: int, wavelengths: int) -> Iterator[slice]:
+        """Yields parts of so many directions, for which |P|^2 and P of all modes take bounded memory."""
+        at_once = _DIRECTIONS_AT_ONCE
+        if not self.is_held:
+            at_once = max(1, min(at_once, _AMPLITUDE_BYTES // self._amplitude_bytes(1, wavelengths)))
+        for first in range(0, directions, at_once):
+            yield slice(first, min(first + at_once, directions))
 
     def making(self) -> resources.Arrays:
-        """Lists the arrays while the first stack is made."""
-        return {
-            "height fields of the reference": self.windows * self.extent.bytes,
-            **self.stack.chebyshev_bytes(self.terms, 8),
-        }
+        """Lists the arrays while a stack that is held is made."""
+        made = self.stack.chebyshev_bytes(self.terms, 8) if self.is_held else {}
+        return {"height field of the reference": self.extent.bytes, **made}
 
     def answering(self, directions: int, wavelengths: int, material: Material) -> resources.Arrays:
-        """Lists the arrays while it answers for directions: stacks, |P|^2 of a tile, a metal's reflectance there.
+        """Lists the arrays while it answers for directions: the stack, |P|^2 of a tile, a metal's reflectance there.
 
-        The stacks of other windows are made while the answer of the first is kept.
+        A stack that is not held is made in parts, while P of every mode is kept.
         """
-        tile = min(directions, _DIRECTIONS_AT_ONCE)
+        tile = next(self.tiles(directions, wavelengths)).stop
         units = os.cpu_count() or 1
-        power = windowed_dft.exact_power_bytes(tile, wavelengths, self.stack.reach[0], self.terms, units)
+        terms = self.terms_at_once
+        power = windowed_dft.exact_power_bytes(tile, wavelengths, self.stack.reach[0], terms, units, self._modes)
         # four complex arrays of Fresnel's equations, R and its product with |P|^2
         metal = (4 * 16 + 2 * 8) * tile * wavelengths if material.fresnel == "conductor" else 0
-        others = self.stack.chebyshev_bytes(self.terms, 8) if self.windows > 1 else {}
+        parts = {} if self.is_held else self.stack.chebyshev_bytes(terms, 8)
         return {
             "reference": self.nbytes,
             "|P|^2 of directions": power,
+            "P of modes": self._amplitude_bytes(tile, wavelengths),
             "reflectances of directions": metal,
-            "reference of another window": sum(others.values()),
+            "part of the reference": sum(parts.values()),
         }
 
     def seconds(self, directions: float, wavelengths: int) -> float:
         """Estimates the time of an answer: the coefficients under the window, of all terms, in double precision."""
         taps = (2 * self.stack.reach[0] + 1) * (2 * self.stack.reach[1] + 1)
-        return resources.seconds(2.0 * self.windows * directions * wavelengths * taps * 2 * self.terms)
+        # sums over rows are shared by the modes along x
+        sums = self._modes[1] if self.serves_all else self.places.count
+        return resources.seconds(2.0 * sums * directions * wavelengths * taps * 2 * self.terms)
 
 
-def size(extent: Extent, sigma_um: float, lambda_min_nm: float, windows: int) -> ReferenceSize:
-    """Computes the size of a `MeanReference` of a height field before it is made.
+def size(extent: Extent, sigma_um: float, lambda_min_nm: float, places: Places) -> ReferenceSize:
+    """Computes the size of a `Reference` of a height field before it is made.
 
     extent: of the height field. sigma_um: standard deviation of the coherence window, um. lambda_min_nm: shortest
-    wavelength, nm. windows: number of positions of the window.
+    wavelength, nm. places: positions of the window.
     """
     reachable = expansion.W_MAX / (1e-3 * lambda_min_nm)
-    chosen = dft_stack.size(extent, sigma_um, reachable, _TOLERANCE)
-    return ReferenceSize(_terms(extent.half_range_um, lambda_min_nm), chosen, windows, extent)
-
-
-def _tiles(count: int) -> Iterator[slice]:
-    for first in range(0, count, _DIRECTIONS_AT_ONCE):
-        yield slice(first, min(first + _DIRECTIONS_AT_ONCE, count))
+    serves_all = dft_stack.serves_all(extent, sigma_um, _TOLERANCE, places.count)
+    chosen = dft_stack.size(extent, sigma_um, reachable, _TOLERANCE, whole=serves_all)
+    return ReferenceSize(_terms(extent.half_range_um, lambda_min_nm), chosen, serves_all, places, extent)

@@ -40,11 +40,11 @@ class Foreseen:
     made: Mapping[str, Summary]
 
     @property
-    def windows(self) -> int:
-        """Number of positions of the coherence window."""
+    def places(self) -> windows.Places:
+        """Positions of the coherence window."""
         if not self.config.table.averages_windows:
-            return 1
-        return windows.count(self.extent.size_um, self.config.coherence)
+            return windows.MIDDLE
+        return windows.places(self.extent, self.config.coherence)
 
     @property
     def wavelengths(self) -> int:
@@ -56,7 +56,7 @@ class Foreseen:
     def reference(self) -> reference.ReferenceSize:
         """Size of the exact reference."""
         sigma_um, lambda_min_nm = self.config.coherence.sigma_um, self.config.light.lambda_min_nm
-        return reference.size(self.extent, sigma_um, lambda_min_nm, self.windows)
+        return reference.size(self.extent, sigma_um, lambda_min_nm, self.places)
 
     def reading(self, **objects: int) -> Arrays:
         """Lists what the first stage of several holds while it reads objects that the session did not keep."""

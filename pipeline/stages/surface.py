@@ -7,7 +7,7 @@ from typing import Any
 from pipeline import resources
 from pipeline.accuracy import exact
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import InputError
 from pipeline.progress import Progress
 from pipeline.resources import Need, largest
@@ -166,7 +166,7 @@ def of(inputs: Inputs) -> HeightField:
     return inputs.session.get("height field", lambda: load(inputs["surface"]))
 
 
-def reference_of(config: Config, inputs: Inputs, progress: Progress) -> MeanReference:
+def reference_of(config: Config, inputs: Inputs, progress: Progress) -> Reference:
     """Returns the exact reference of the height field, which the stages table, validate and bundle share."""
     return inputs.session.get("reference", lambda: exact.reference_of(of(inputs), config, progress))
 

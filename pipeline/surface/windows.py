@@ -5,11 +5,13 @@ the expectation of |P|^2 ([S99], [D14] eq. 2), and its speckle has a lower contr
 scan about as large as the window, the only position is the middle.
 """
 
+from dataclasses import dataclass
 from math import floor
 
 import numpy as np
 
 from pipeline.optics.coherence import Coherence
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 
 # a window is four sigma wide ([D14] sec. 4.2); windows half a width apart still reduce the speckle
@@ -18,27 +20,54 @@ _WIDTH_SIGMAS, _STEP_SIGMAS = 4.0, 2.0
 _MOST = 3
 
 
-def places(field: HeightField, coherence: Coherence) -> list[HeightField]:
-    """Shifts the field so that each position of the window comes to the middle of the patch.
+@dataclass(frozen=True)
+class Places:
+    """Positions of the window: every distance along x with every distance along y.
 
-    field: the whole scan. coherence: width of the window, and whether several are wanted.
-    Returns one field per position, that of the middle first.
+    x, y: distances from the middle of the patch, samples. Each list holds the opposite of all its entries.
     """
-    along = _along(field.size_um, coherence)
-    shifts = [(round(y / field.pitch_um[1]), round(x / field.pitch_um[0])) for y in along[1] for x in along[0]]
-    # the smallest shift first: planning and checks on a single window use that of the middle
-    shifts.sort(key=lambda shift: (abs(shift[0]) + abs(shift[1]), shift))
-    return [HeightField(np.roll(field.heights_um, (-y, -x), axis=(0, 1)), field.pitch_um) for y, x in shifts]
+
+    x: tuple[int, ...] = (0,)
+    y: tuple[int, ...] = (0,)
+
+    @property
+    def count(self) -> int:
+        """Number of positions."""
+        return len(self.x) * len(self.y)
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Lists the positions as (x, y)."""
+        return [(x, y) for y in self.y for x in self.x]
 
 
-def count(size_um: tuple[float, float], coherence: Coherence) -> int:
-    """Computes how many positions a patch of this size (x, y), um, has."""
-    along_x, along_y = _along(size_um, coherence)
-    return len(along_x) * len(along_y)
+MIDDLE = Places()
 
 
-def _along(size_um: tuple[float, float], coherence: Coherence) -> list[list[float]]:
-    return [_offsets(size, coherence.sigma_um) if coherence.windows == "auto" else [0.0] for size in size_um]
+def places(extent: Extent, coherence: Coherence) -> Places:
+    """Chooses the positions of the window.
+
+    extent: of the whole scan. coherence: width of the window, and whether several are wanted.
+    """
+    if coherence.windows != "auto":
+        return MIDDLE
+    x, y = (
+        tuple(round(offset / pitch) for offset in _offsets(size, coherence.sigma_um))
+        for size, pitch in zip(extent.size_um, extent.pitch_um, strict=True)
+    )
+    return Places(x, y)
+
+
+def around(field: HeightField, place: tuple[int, int], shape: tuple[int, int]) -> HeightField:
+    """Cuts the samples about a position out of the patch, which repeats periodically.
+
+    place: distance (x, y) of the position from the middle of the patch, samples. shape: samples (ny, nx) of the part.
+    Returns the part, whose middle is the position.
+    """
+    rows, columns = (
+        (np.arange(part) - part // 2 + whole // 2 + shift) % whole
+        for part, whole, shift in zip(shape, field.shape, place[::-1], strict=True)
+    )
+    return HeightField(field.heights_um[np.ix_(rows, columns)], field.pitch_um)
 
 
 def _offsets(size_um: float, sigma_um: float) -> list[float]:

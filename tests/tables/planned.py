@@ -5,7 +5,7 @@ from pathlib import Path
 from pipeline.accuracy.exact import reference_of
 from pipeline.config.models import Config
 from pipeline.config.read import parse
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.surface import recipes, windows
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import table as polar
@@ -26,7 +26,7 @@ def field_of(found: Config) -> HeightField:
     return recipes.make(found.surface.recipe)
 
 
-def exact_of(found: Config) -> MeanReference:
+def exact_of(found: Config) -> Reference:
     """The reference of a config."""
     return reference_of(field_of(found), found)
 
@@ -35,9 +35,10 @@ def planned(found: Config) -> tuple[polar.PolarTable, plan.Plan]:
     """The table of a config and its plan."""
     budget = plan.Budget(found.budget_delta_e, found.accuracy.exposure_ru)
     sigma = found.coherence.sigma_um
-    fields = windows.places(field_of(found), found.coherence)
-    trial = plan.start(fields, sigma, found.light, found.scene, budget, found.table)
+    field = field_of(found)
+    places = windows.places(field.extent, found.coherence)
+    trial = plan.start(field, places, sigma, found.light, found.scene, budget, found.table)
     chosen = plan.choose(trial, found.scene, budget, found.table)
-    power = trial.mean_power_spectrum(chosen.azimuths, fields[1:])
+    power = trial.mean_power_spectrum(chosen.azimuths)
     bake = chosen.bake(found.radiometry, budget, found.table)
     return bake.table(power, chosen.rings, bake.rules(chosen.rings.rho())), chosen

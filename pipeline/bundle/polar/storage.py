@@ -13,7 +13,7 @@ from pipeline.arrays import Array
 from pipeline.bundle import half
 from pipeline.bundle.polar.layout import PolarLoss
 from pipeline.config.models import Config, Publish
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import ColourError, delta_e
 from pipeline.optics.random_directions import random_pairs
@@ -79,7 +79,7 @@ def mean_error(random: RandomCheck, config: Config) -> float:
     return next(error.mean for error in random.colour if error.exposure_ru == config.accuracy.exposure_ru)
 
 
-def choose(config: Config, table: PolarTable, reference: MeanReference) -> tuple[Stored, PolarLoss, RandomCheck]:
+def choose(config: Config, table: PolarTable, reference: Reference) -> tuple[Stored, PolarLoss, RandomCheck]:
     """Stores a table as [publish] asks, and measures the error that this adds.
 
     "auto" in half floats takes the fewest textures whose error is within the budget, on the directions of this choice
@@ -134,7 +134,7 @@ def _textures(table: PolarTable, count: int, config: Config) -> Textures:
 class _Measure:
     """Compares stored textures with the exact sum and with the table itself, on random directions."""
 
-    def __init__(self, config: Config, table: PolarTable, reference: MeanReference) -> None:
+    def __init__(self, config: Config, table: PolarTable, reference: Reference) -> None:
         self._config, self._most, self._unit = config, most_textures(table), config.radiometry.unit
         self._wi, self._wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
         self._truth = reference.xyz(config.light, config.material, self._wi, self._wr)

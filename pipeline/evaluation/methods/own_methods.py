@@ -11,6 +11,7 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.diffraction.reference import Reference, in_band
 from pipeline.evaluation.methods.method import Monochromatic
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import MIDDLE
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.layout import PolarLayout
@@ -28,7 +29,7 @@ class Exact(Monochromatic):
         """Raises AccuracyError where the samples do not resolve the window; DeviceError where no device works."""
         super().__init__(config)
         self._reference = Reference(field, config.coherence.sigma_um, config.light.lambda_min_nm)
-        self.stored_bytes = self._reference.stored_bytes
+        self.stored_bytes = self._reference.stack_bytes
 
     def xyz(self, wi: Array, wr: Array) -> Array:
         return self._reference.xyz(self._config.light, self._config.material, wi, wr)
@@ -50,9 +51,10 @@ class PolarTableMethod(Monochromatic):
     def __init__(self, field: HeightField, config: Config) -> None:
         """Raises AccuracyError where the budget is out of reach; DeviceError where no device works."""
         super().__init__(config)
-        self._field = crop_to_window(field, config.coherence.sigma_um).centred()
         self._layout = config.table if isinstance(config.table, PolarLayout) else PolarLayout()
         self._budget = Budget(config.budget_delta_e, config.accuracy.exposure_ru)
+        cut = plan.AMPLITUDE_SHARE * self._budget.delta_e
+        self._field = crop_to_window(field, config.coherence.sigma_um, cut).centred()
         power, chosen = self._planned(self._layout)
         bake = chosen.bake(config.radiometry, self._budget, self._layout)
         table = bake.table(power, chosen.rings, bake.rules(chosen.rings.rho()))
@@ -72,7 +74,7 @@ class PolarTableMethod(Monochromatic):
         return spectral.build(self._planned(self._layout.model_copy(update={"form": "spectral"}))[0])
 
     def _planned(self, layout: PolarLayout) -> tuple[PolarPowerSpectrum, Plan]:
-        config = self._config
-        trial = plan.start([self._field], config.coherence.sigma_um, config.light, config.scene, self._budget, layout)
+        config, sigma_um = self._config, self._config.coherence.sigma_um
+        trial = plan.start(self._field, MIDDLE, sigma_um, config.light, config.scene, self._budget, layout)
         chosen = plan.choose(trial, config.scene, self._budget, layout)
         return trial.power_spectrum(chosen.azimuths), chosen

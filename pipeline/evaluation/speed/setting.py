@@ -16,6 +16,7 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import MIDDLE
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
@@ -84,8 +85,8 @@ def make(field: HeightField, config: Config, layout: PolarLayout) -> Setting:
 def first_bake(field: HeightField, config: Config, layout: PolarLayout) -> tuple[PolarPowerSpectrum, Setting]:
     """Return the power spectrum and the setting of a table of a layout."""
     sigma_um = config.coherence.sigma_um
-    seen = crop_to_window(field, sigma_um).centred()
-    trial = plan.start([seen], sigma_um, config.light, None, BUDGET, layout)
+    seen = crop_to_window(field, sigma_um, plan.AMPLITUDE_SHARE * BUDGET.delta_e).centred()
+    trial = plan.start(seen, MIDDLE, sigma_um, config.light, None, BUDGET, layout)
     chosen = plan.choose(trial, None, BUDGET, layout)
     bake = chosen.bake(Radiometry(config.light, config.material, sigma_um), BUDGET, PolarLayout())
     return trial.power_spectrum(chosen.azimuths), Setting(seen, chosen, bake)

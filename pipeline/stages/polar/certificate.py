@@ -8,7 +8,7 @@ from pipeline.accuracy.certificate import Certificate, errors_of, refuse_clampin
 from pipeline.accuracy.checks import MIRROR_FLOOR, RelativeError, relative_error
 from pipeline.config.models import Config
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.light import trapezoid
@@ -21,9 +21,7 @@ from pipeline.tables.polar.planning import plan
 _SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
 
-def certify(
-    interpolate: Evaluator, reference: MeanReference, config: Config, progress: Progress = silent
-) -> Certificate:
+def certify(interpolate: Evaluator, reference: Reference, config: Config, progress: Progress = silent) -> Certificate:
     """Measures a table as `pipeline.accuracy.certificate.measure` does, and enforces the budget of its plan.
 
     Returns the certificate, with the budget of the plan.
@@ -40,10 +38,10 @@ def certify(
     return found
 
 
-def _remedy(reference: MeanReference, config: Config) -> str:
+def _remedy(reference: Reference, config: Config) -> str:
     """Suggests what to do about a missed budget; a grid cannot resolve the hard cut at the scan's Nyquist limit."""
     text = 'Raise accuracy.delta_e, or leave table.rings, azimuths, terms and w_terms on "auto".'
-    band = min(reference.fields[0].band_limit_per_um)
+    band = min(reference.field.band_limit_per_um)
     if band >= plan.rho_max(config.scene) / (1e-3 * config.light.lambda_min_nm):
         return text
     return (
@@ -52,7 +50,7 @@ def _remedy(reference: MeanReference, config: Config) -> str:
     )
 
 
-def certify_spectral(power: PolarPowerSpectrum, reference: MeanReference, config: Config) -> RelativeError:
+def certify_spectral(power: PolarPowerSpectrum, reference: Reference, config: Config) -> RelativeError:
     """Measures |P|^2 of single wavelengths, by the spectral form of a table, on random directions.
 
     power: the power spectrum E. reference: of the same height field. config: its light and scene are read.

@@ -57,11 +57,15 @@ def budget(config: Config) -> plan.Budget:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    fields = windows.places(surface.of(inputs), config.coherence)
+    field = surface.of(inputs)
+    places = windows.places(field.extent, config.coherence)
     layout, allowed = layout_of(config), budget(config)
-    trial = plan.start(fields, config.coherence.sigma_um, config.light, config.scene, allowed, layout, progress)
+    sigma_um, light = config.coherence.sigma_um, config.light
+    trial = plan.start(field, places, sigma_um, light, config.scene, allowed, layout, progress)
     chosen = plan.choose(trial, config.scene, allowed, layout)
-    built = trial.mean_power_spectrum(chosen.azimuths, fields[1:], progress)
+    built = trial.mean_power_spectrum(chosen.azimuths, progress)
+    # its memory serves the writing
+    del trial
     arrays.save(
         folder / _FILE,
         {
@@ -84,7 +88,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         **asdict(chosen),
         "radii": len(built.radius_per_um),
         "bytes": built.values.nbytes,
-        "windows": len(fields),
+        "windows": places.count,
         "speckle_contrast": power_spectrum.speckle_contrast(built),
     }
 
@@ -131,4 +135,4 @@ def _work(config: Config) -> str:
     return f"a grid for a mean dE of {config.budget_delta_e:g}"
 
 
-POWER_SPECTRUM = Stage("power_spectrum", 4, ("surface",), _parameters, _produce, uses_device=True, work=_work)
+POWER_SPECTRUM = Stage("power_spectrum", 5, ("surface",), _parameters, _produce, uses_device=True, work=_work)

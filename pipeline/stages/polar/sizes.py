@@ -15,7 +15,7 @@ from pipeline.stages.polar import power_spectrum
 from pipeline.store.arrays import loading_bytes, saving_bytes
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.bake import PolarBake
-from pipeline.tables.polar.planning import plan
+from pipeline.tables.polar.planning import plan, trial
 from pipeline.tables.polar.planning.grid_search import Grids
 from pipeline.tables.polar.spectral_integral import IntegralSize
 
@@ -37,7 +37,9 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
     bake, rings, azimuths = _grid(foreseen)
     integral = bake.integral_size(rings, azimuths)
     e_bytes, metal = bake.power_spectrum_bytes(azimuths), config.material.fresnel == "conductor"
-    chosen = dft_stack.size(foreseen.extent, bake.sigma_um, float(bake.radius_per_um[-1]), bake.tolerance)
+    whole = trial.serves_all(bake, foreseen.extent, foreseen.places)
+    reach_per_um = float(bake.radius_per_um[-1])
+    chosen = dft_stack.size(foreseen.extent, bake.sigma_um, reach_per_um, bake.tolerance, whole=whole)
     searched = _SEARCHED if "auto" in (layout.rings, layout.azimuths) else 0
     # the planner's spectral integral is that of a grey surface; a grid that the config sets is not tried
     tried = integral.arrays() if searched else {}
@@ -52,7 +54,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         table=_table(foreseen, integral, e_bytes, freed_bytes),
         transform_bytes=e_bytes,
         table_bytes=integral.table_bytes,
-        freed_bytes=freed_bytes + reference.stack.stack_bytes(reference.terms, 8),
+        freed_bytes=freed_bytes + reference.part_bytes,
         study=_study(bake, rings, azimuths, metal=metal),
         textures=Need({} if is_whole else choosing, reference.seconds(2 * RANDOM_DIRECTIONS, foreseen.wavelengths)),
         # as stored in half floats, and as read back
@@ -72,14 +74,15 @@ def _transform(
 ) -> Need:
     """Returns the need of the stage "power_spectrum"; searched: tables that the search for a grid measures."""
     filled, e_bytes = spectrum.filled_terms(bake.terms), bake.power_spectrum_bytes(azimuths)
-    e_seconds = _gather_seconds(bake, azimuths, chosen.reach) * foreseen.windows
+    e_seconds, windows = _gather_seconds(bake, azimuths, chosen.reach), foreseen.places.count
+    stacks = 1 if trial.serves_all(bake, foreseen.extent, foreseen.places) else windows
     return Need(
         {
             **process(_TRANSFORM_BYTES),
             **_transforming(foreseen, bake, azimuths, chosen, integral.arrays() if searched else {}),
         },
-        resources.seconds(chebyshev_work(chosen, filled) * foreseen.windows)
-        + e_seconds * (1 + searched / 2)
+        resources.seconds(chebyshev_work(chosen, filled) * stacks)
+        + e_seconds * (windows + searched / 2)
         + integral.seconds * searched,
         max(
             chosen.stack_bytes(filled, 4),
@@ -112,7 +115,7 @@ def _table(foreseen: Foreseen, integral: IntegralSize, e_bytes: int, freed_bytes
     return Need(
         needed,
         integral.seconds + reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths),
-        max(integral.table_bytes, integral.weights_bytes, reference.stack.stack_bytes(reference.terms, 8)),
+        max(integral.table_bytes, integral.weights_bytes, reference.part_bytes),
     )
 
 
@@ -140,18 +143,19 @@ def _transforming(
     between = stack["terms between two transforms"]
     always = {
         **foreseen.held(),
-        "height fields of all windows": foreseen.windows * foreseen.extent.bytes,
+        "height field of the windows": foreseen.extent.bytes,
         "stack": stack["stack"],
     }
     # positions, radii, azimuths and light of all coefficients
     scattering = 7 * 8 * chosen.kept.shape[0] * chosen.kept.shape[1]
     freed = spare(between, sum(table.values()))
-    several = {"power spectrum of another window": e_bytes, "stack of another window": sum(stack.values())}
+    several = {"power spectrum of another window": e_bytes, **stack}
+    has_several = foreseen.places.count > 1 and not trial.serves_all(bake, foreseen.extent, foreseen.places)
     return largest(
         {**always, **stack},
         {**always, "scattered light": scattering, **spare(between)},
         {**always, "power spectrum": e_bytes, **table, **spare(between)},
-        {**always, "power spectrum": e_bytes, **(several if foreseen.windows > 1 else {}), **freed},
+        {**always, "power spectrum": e_bytes, **(several if has_several else {}), **freed},
         {
             **always,
             "power spectrum": e_bytes,

@@ -56,7 +56,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
     table = Need(
         needed,
         seconds + reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths),
-        max(building["stack on the device"], reference.stack.stack_bytes(reference.terms, 8)),
+        max(building["stack on the device"], reference.part_bytes),
     )
     other = min(301, layout.resolution)
     study = {"stack": stack_bytes, **taylor.building_arrays(other, terms, chosen)}
@@ -68,7 +68,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         table=table,
         transform_bytes=0,
         table_bytes=table_bytes,
-        freed_bytes=freed_bytes + reference.stack.stack_bytes(reference.terms, 8),
+        freed_bytes=freed_bytes + reference.part_bytes,
         study=Need(study, taylor.seconds(_STUDIED_NODES, wavelengths, terms, chosen)),
         textures=Need(storing if in_half else {}, reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths)),
         stored_bytes=table_bytes if in_half else 0,

@@ -99,4 +99,4 @@ def load(artifact: Artifact) -> dft_stack.Stack:
     return dft_stack.Stack(coefficients=coefficients, terms=coefficients.shape[3], **found)
 
 
-STACK = Stage("stack", 3, ("surface",), _parameters, _produce)
+STACK = Stage("stack", 4, ("surface",), _parameters, _produce)

@@ -12,6 +12,7 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import MIDDLE, Places
 from pipeline.tables.polar import quadrature, spectral_integral
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.spectral_integral import IntegralSize
@@ -52,18 +53,23 @@ class PolarBake:
         """Standard deviation of the coherence window, um."""
         return self.radiometry.sigma_um
 
-    def stack(self, field: HeightField, progress: Progress = silent) -> Stack:
-        """Transforms the Chebyshev terms of the height field of one window, in float32.
+    def stack(self, field: HeightField, progress: Progress = silent, *, whole: bool = False) -> Stack:
+        """Transforms the Chebyshev terms of the heights that a window in the middle sees, or of all, in float32.
 
         Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does not fit into
         memory, and DeviceError if no device works.
         """
         reach = float(self.radius_per_um[-1])
-        return power_spectrum.chebyshev_stack(field, self.sigma_um, reach, self.terms, self.tolerance, progress)
+        return power_spectrum.chebyshev_stack(
+            field, self.sigma_um, reach, self.terms, self.tolerance, progress, whole=whole
+        )
 
-    def power_spectrum(self, stack: Stack, azimuths: Azimuths) -> PolarPowerSpectrum:
-        """Computes E from a stack on the given azimuths. Raises DeviceError if no device works."""
-        return power_spectrum.build(stack, azimuths, self.radius_per_um, self.lambda_min_nm, self.s_nodes)
+    def power_spectrum(self, stack: Stack, azimuths: Azimuths, places: Places = MIDDLE) -> PolarPowerSpectrum:
+        """Computes E from a stack on the given azimuths, of one window or the mean over several.
+
+        Raises DeviceError if no device works.
+        """
+        return power_spectrum.build(stack, azimuths, self.radius_per_um, self.lambda_min_nm, self.s_nodes, places)
 
     def rules(self, rho: Array) -> RingQuadratures:
         """Chooses the wavelengths of rings at radii `rho` (n_rings,), dimensionless, for `quadrature_error`.

@@ -97,8 +97,8 @@ class GridSearch:
     ) -> None:
         """Computes the anisotropy of the surface.
 
-        trial: the first window's stack. layout: numbers that are set. scene: lights and views, None for all.
-        delta_e: mean CIELAB error allowed. exposure_ru: exposure at which it is measured, RU.
+        trial: the stack of the window in the middle. layout: numbers that are set. scene: lights and views, None for
+        all. delta_e: mean CIELAB error allowed. exposure_ru: exposure at which it is measured, RU.
         """
         self._trial, self._bake, self._layout, self._scene = trial, trial.bake, layout, scene
         self._delta_e, self._exposure_ru = delta_e, exposure_ru

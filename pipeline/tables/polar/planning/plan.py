@@ -4,7 +4,6 @@ Numbers of terms and nodes follow from the tails of the series: Bessel functions
 exponential (Jacobi-Anger expansion). The grid depends on the surface and is searched for.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
@@ -18,6 +17,7 @@ from pipeline.optics.material import Material
 from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import Places
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.planning.grid_search import GridSearch
@@ -93,7 +93,8 @@ def rho_max(scene: Scene | None) -> float:
 
 
 def start(
-    fields: Sequence[HeightField],
+    field: HeightField,
+    places: Places,
     sigma_um: float,
     light: Light,
     scene: Scene | None,
@@ -101,17 +102,17 @@ def start(
     layout: PolarLayout,
     progress: Progress = silent,
 ) -> Trial:
-    """Chooses all numbers of terms and nodes for a budget, and transforms the first window.
+    """Chooses all numbers of terms and nodes for a budget, and transforms the heights.
 
-    fields: one height field per position of the window (pipeline.surface.windows), that of the middle first.
+    field: the whole scan. places: positions of the coherence window (pipeline.surface.windows).
     sigma_um: standard deviation of the window, um. light: the range of wavelengths, or a laser line.
     scene: lights and views, None for all. budget: the error allowed. layout: numbers that are set.
     progress: called with the share done.
     Returns the trial for `choose`. Raises AccuracyError if the samples do not resolve the window, ResourceError if
     the stack does not fit into memory, and DeviceError if no device works.
     """
-    half_range_um = max(field.half_range_um for field in fields)
-    return Trial(numbers(half_range_um, sigma_um, light, scene, budget, layout), fields[0], progress)
+    bake = numbers(field.half_range_um, sigma_um, light, scene, budget, layout)
+    return Trial(bake, field, places, progress)
 
 
 def numbers(

@@ -1,28 +1,43 @@
-"""Tables of the first coherence window on several grids, whose errors the planner measures."""
-
-from collections.abc import Sequence
+"""Tables of the coherence window in the middle on several grids, whose errors the planner measures."""
 
 import numpy as np
 
+from pipeline.diffraction import dft_stack
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.progress import Progress, silent
+from pipeline.surface import windows
+from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import Places
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.table import PolarTable
 
+# the kernel of several windows keeps this many terms of each mode
+_MOST_TERMS = 256
+
+
+def serves_all(bake: PolarBake, extent: Extent, places: Places) -> bool:
+    """Says whether the stack of a trial serves all windows; else each has one of its own."""
+    fits = bake.terms <= _MOST_TERMS
+    return fits and dft_stack.serves_all(extent, bake.sigma_um, bake.tolerance, places.count)
+
 
 class Trial:
-    """The stack of the first coherence window, and tables made from it.
+    """The stack of the coherence window in the middle, and tables made from it.
 
     bake: the settings that all tables share, with the light and the grey material of the planner.
-    stack: the DFT stack of the window.
+    stack: the DFT stack of the window, or of the whole patch if that serves the other windows, too.
     """
 
-    def __init__(self, bake: PolarBake, field: HeightField, progress: Progress = silent) -> None:
-        """Transforms the height field of the window. Raises the errors of `PolarBake.stack`."""
-        self.bake = bake
-        self.stack = bake.stack(field, progress)
+    def __init__(self, bake: PolarBake, field: HeightField, places: Places, progress: Progress = silent) -> None:
+        """Transforms the height field.
+
+        field: the whole scan. places: positions of the window. Raises the errors of `PolarBake.stack`.
+        """
+        self.bake, self._field, self._places = bake, field, places
+        self._serves_all = serves_all(bake, field.extent, places)
+        self.stack = bake.stack(field, progress, whole=self._serves_all)
         self._made: PolarPowerSpectrum | None = None
 
     def power_spectrum(self, azimuths: Azimuths) -> PolarPowerSpectrum:
@@ -40,15 +55,27 @@ class Trial:
         """Makes the table on a grid."""
         return self.bake.table(self.power_spectrum(azimuths), rings, self.bake.rules(rings.rho()))
 
-    def mean_power_spectrum(
-        self, azimuths: Azimuths, others: Sequence[HeightField], progress: Progress = silent
-    ) -> PolarPowerSpectrum:
-        """Computes the mean of E over this window and others.
+    def mean_power_spectrum(self, azimuths: Azimuths, progress: Progress = silent) -> PolarPowerSpectrum:
+        """Computes the mean of E over all windows.
 
-        others: height fields of the other windows. progress: called with the share done of each transform.
+        progress: called with the share done of each transform.
         """
-        mean, self._made = self.power_spectrum(azimuths), None
-        for field in others:
-            mean.values[...] += self.bake.power_spectrum(self.bake.stack(field, progress), azimuths).values
-        mean.values[...] /= np.float32(1 + len(others))
+        if self._places == windows.MIDDLE:
+            return self.power_spectrum(azimuths)
+        self._made = None
+        if self._serves_all:
+            return self.bake.power_spectrum(self.stack, azimuths, self._places)
+        samples = dft_stack.samples_seen(self._field.extent, self.bake.sigma_um, self.bake.tolerance)
+        mean: PolarPowerSpectrum | None = None
+        for place in self._places.pairs():
+            # release the memory first, so that the next stack can reuse it
+            del self.stack
+            self.stack = self.bake.stack(windows.around(self._field, place, samples), progress)
+            found = self.bake.power_spectrum(self.stack, azimuths)
+            if mean is None:
+                mean = found
+            else:
+                mean.values[...] += found.values
+        assert mean is not None
+        mean.values[...] /= np.float32(self._places.count)
         return mean
