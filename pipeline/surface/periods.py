@@ -1,7 +1,9 @@
 """The strongest periods of a height field: the lobes of its power spectrum, found by mean shift."""
 
+import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import cache
 from math import atan2, degrees, log, pi
 
@@ -26,6 +28,10 @@ _LEAST_CONTRAST = 5.0
 _LINE_SHARE, _LINE_CONTRAST, _LINE_BINS = 0.07, 8.0, 2.0
 # least share of the variance
 _LEAST_SHARE = 0.005
+# rows or columns that are transformed at once
+_LINES_AT_ONCE = 32
+# how far a kernel's tail is followed, in standard deviations
+_KERNEL_SIGMAS = 6.0
 
 
 @dataclass(frozen=True)
@@ -123,20 +129,42 @@ def _period(frequency: complex, share: float) -> Period:
 def _spectrum(field: HeightField, highest_per_um: float, window_of: Callable[[int], Array]) -> _HeightSpectrum:
     """Computes the power spectrum of a field for |fx|, |fy| <= `highest_per_um`, under a window along both axes."""
     ny, nx = field.shape
-    window = window_of(ny)[:, None] * window_of(nx)
-    seen = (field.heights_um - float(np.sum(field.heights_um * window) / np.sum(window))) * window
-    weight = float(np.sum(window**2))
-    # by Parseval's theorem, the sum over all frequencies; the rounding errors of a flat field count as 0
-    peak, variance = float(np.max(np.abs(field.heights_um))), float(np.vdot(seen, seen)) / weight
-    variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
+    along_y, along_x = window_of(ny), window_of(nx)
+    heights = field.heights_um
+    mean = float(np.sum(along_y * np.vecdot(heights, along_x)) / (np.sum(along_y) * np.sum(along_x)))
+    weight = float(np.sum(along_y**2) * np.sum(along_x**2))
     x, fx = _ascending(nx, field.pitch_um[0], highest_per_um)
     y, fy = _ascending(ny, field.pitch_um[1], highest_per_um)
-    # rfft2 returns half of the spectrum; the other half equals it at opposite frequencies
+    # a real transform gives half of the spectrum; the other half equals it at opposite frequencies
     opposite = x > nx // 2
-    rows, columns = np.where(opposite, -y[:, None], y[:, None]) % ny, np.where(opposite, nx - x, x)
-    power = np.abs(fourier.rfft2(seen)[rows, columns]) ** 2 / (seen.size * weight)
+    columns = np.where(opposite, nx - x, x)
+    half = np.empty((ny, int(columns.max(initial=0)) + 1), complex)
+
+    def transform_rows(rows: slice) -> float:
+        seen = (heights[rows] - mean) * along_y[rows, None] * along_x
+        half[rows] = np.fft.rfft(seen, axis=1)[:, : half.shape[1]]
+        # a matrix product would start competing threads
+        return float(np.sum(np.vecdot(seen, seen)))
+
+    def transform_columns(part: slice) -> None:
+        half[:, part] = np.fft.fft(half[:, part], axis=0)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        # by Parseval's theorem, the sum over all frequencies; the rounding errors of a flat field count as 0
+        variance = sum(pool.map(transform_rows, _parts(ny))) / weight
+        list(pool.map(transform_columns, _parts(half.shape[1])))
+    peak = max(float(heights.max()), -float(heights.min()))
+    variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
+    power = np.empty((len(y), len(x)))
+    for side, rows in ((~opposite, y), (opposite, -y % ny)):
+        power[:, side] = np.abs(half[np.ix_(rows, columns[side])]) ** 2 / (heights.size * weight)
     size_x, size_y = field.size_um
     return _HeightSpectrum(power, fx, fy, (1 / size_x, 1 / size_y), variance)
+
+
+def _parts(count: int) -> list[slice]:
+    """Divides rows or columns into parts that fit into a core's cache."""
+    return [slice(first, min(first + _LINES_AT_ONCE, count)) for first in range(0, count, _LINES_AT_ONCE)]
 
 
 def _ascending(samples: int, pitch_um: float, highest_per_um: float) -> tuple[np.ndarray, Array]:
@@ -166,22 +194,29 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
 
     Each octave of |f| is smoothed by a kernel of its own width. Octaves overlap, so that no maximum lies between two.
     """
-    from scipy import fft, ndimage
+    from scipy import ndimage
 
-    fx, fy = spectrum.fx, spectrum.fy[:, None]
-    radius = np.hypot(fx, fy)
-    repeats = np.hypot(fx / spectrum.bin_per_um[0], fy / spectrum.bin_per_um[1])
-    allowed = (repeats >= _FEWEST_REPEATS) & (radius <= highest_per_um) & ((fx > 0) | ((fx == 0) & (fy > 0)))
     bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
     lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
+    highest = float(np.hypot(np.max(np.abs(spectrum.fx), initial=0.0), np.max(np.abs(spectrum.fy), initial=0.0)))
     candidates: list[tuple[float, complex]] = []
-    # padded with zeros to sizes with fast transforms
-    my, mx = (fft.next_fast_len(n, real=True) for n in spectrum.power.shape)
-    transform = fourier.rfft2(spectrum.power, (my, mx))
-    while lowest < float(radius.max()):
+    near: _HeightSpectrum | None = None
+    while lowest < highest:
         width_x, width_y = _extent(spectrum, complex(1.4 * lowest), _KERNEL, _KERNEL_BINS)
-        density = _smooth(spectrum, transform, (my, mx), width_x, width_y)
-        peaks = allowed & (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
+        # what the kernel moves to the octave, and one bin for the neighbours of a maximum
+        reach_x, reach_y = (
+            2.5 * lowest + _KERNEL_SIGMAS * width + bin_
+            for width, bin_ in zip((width_x, width_y), spectrum.bin_per_um, strict=True)
+        )
+        before, near = near, _cut(spectrum, reach_x, reach_y)
+        if before is None or before.power.shape != near.power.shape:
+            transform = fourier.rfft2(near.power, _fast(near.power.shape))
+        fx, fy = near.fx, near.fy[:, None]
+        radius = np.hypot(fx, fy)
+        repeats = np.hypot(fx / spectrum.bin_per_um[0], fy / spectrum.bin_per_um[1])
+        peaks = (repeats >= _FEWEST_REPEATS) & (radius <= highest_per_um) & ((fx > 0) | ((fx == 0) & (fy > 0)))
+        density = _smooth(near, transform, width_x, width_y)
+        peaks &= (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
         peaks &= density == ndimage.maximum_filter(density, 3)
         # all power of a lobe narrower than the kernel, and a part of a wider one's: hence the lower threshold
         power = density * (2 * 2 * pi * width_x * width_y / bin_area)
@@ -192,22 +227,31 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
     return [frequency for _, frequency in candidates]
 
 
-def _smooth(
-    spectrum: _HeightSpectrum,
-    transform: NDArray[np.complex128],
-    padded: tuple[int, int],
-    width_x: float,
-    width_y: float,
-) -> Array:
+def _cut(spectrum: _HeightSpectrum, reach_x: float, reach_y: float) -> _HeightSpectrum:
+    """Returns the part of the spectrum with |fx| <= reach_x and |fy| <= reach_y, 1/um."""
+    x, y = np.flatnonzero(np.abs(spectrum.fx) <= reach_x), np.flatnonzero(np.abs(spectrum.fy) <= reach_y)
+    columns, rows = slice(x[0], x[-1] + 1), slice(y[0], y[-1] + 1)
+    return replace(spectrum, power=spectrum.power[rows, columns], fx=spectrum.fx[columns], fy=spectrum.fy[rows])
+
+
+def _smooth(spectrum: _HeightSpectrum, transform: NDArray[np.complex128], width_x: float, width_y: float) -> Array:
     """Convolves the power with a Gaussian of standard deviations `width_x`, `width_y`, 1/um.
 
-    transform: rfft2 of the power, padded with zeros to the shape `padded` (my, mx).
+    transform: rfft2 of the power, padded with zeros to sizes with fast transforms.
     """
-    my, mx = padded
+    my, mx = _fast(spectrum.power.shape)
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * np.fft.rfftfreq(mx)) ** 2)
     gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * np.fft.fftfreq(my)) ** 2)
     rows, columns = spectrum.power.shape
-    return fourier.irfft2(transform * gain_y[:, None] * gain_x, padded)[:rows, :columns]
+    return fourier.irfft2(transform * gain_y[:, None] * gain_x, (my, mx))[:rows, :columns]
+
+
+def _fast(shape: tuple[int, ...]) -> tuple[int, int]:
+    """Returns the next sizes with fast transforms."""
+    from scipy.fft import next_fast_len
+
+    my, mx = (next_fast_len(n, real=True) for n in shape)
+    return my, mx
 
 
 def _near(
@@ -261,8 +305,9 @@ def _share(spectrum: _HeightSpectrum, middle: complex) -> float:
     frequencies, power = _near(spectrum, middle, rx, ry)
     inside = _inside(frequencies - middle, rx, ry)
     lobe = float(np.sum(power[inside]))
-    distance = np.hypot(spectrum.fx, spectrum.fy[:, None])
-    ring = spectrum.power[np.abs(distance - abs(middle)) <= min(rx, ry)]
+    outermost = abs(middle) + min(rx, ry)
+    near = _cut(spectrum, outermost, outermost)
+    ring = near.power[np.abs(np.hypot(near.fx, near.fy[:, None]) - abs(middle)) <= min(rx, ry)]
     # lobes hardly change the median of the ring; that of speckle, whose power is exponential, is log 2 of the mean
     noise = float(np.median(ring)) / log(2)
     is_lobe = lobe > _LEAST_CONTRAST * noise * np.count_nonzero(inside)
@@ -284,11 +329,13 @@ def _strong_line(spectrum: _HeightSpectrum, start: complex) -> tuple[complex, fl
     share = 2 * float(np.sum(core)) / spectrum.variance
     if share < _LINE_SHARE or _repeats(spectrum, line) < 0.95 * _FEWEST_REPEATS:
         return line, 0.0
-    all_frequencies = spectrum.fx + 1j * spectrum.fy[:, None]
+    outermost = abs(line) + min(reach_x, reach_y)
+    near = _cut(spectrum, outermost, outermost)
+    all_frequencies = near.fx + 1j * near.fy[:, None]
     ring = np.abs(np.abs(all_frequencies) - abs(line)) <= min(reach_x, reach_y)
     for lobe in (line, -line):
         ring &= ~_inside(all_frequencies - lobe, 1.5 * reach_x, 1.5 * reach_y)
-    noise = float(np.median(spectrum.power[ring])) / log(2) if ring.any() else 0.0
+    noise = float(np.median(near.power[ring])) / log(2) if ring.any() else 0.0
     return line, share if float(np.max(core)) > _LINE_CONTRAST * noise else 0.0
 
 

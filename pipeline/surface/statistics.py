@@ -13,6 +13,8 @@ from pipeline.surface.periods import Period, dominant_periods
 
 # [D14] sec. 6.3 takes 500 nm for all visible light
 _REPRESENTATIVE_WAVELENGTH_UM = 0.5
+# rows of a spectrum or of heights that are held at once
+_ROWS_AT_ONCE = 64
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
         reach_covered=covered_share(*field.band_limit_per_um, reach),
         periods=dominant_periods(field, reach),
         seam_step_um=(_rms(heights[:, 0] - heights[:, -1]), _rms(heights[0] - heights[-1])),
-        inner_step_um=(_rms(np.diff(heights, axis=1)), _rms(np.diff(heights, axis=0))),
+        inner_step_um=(_inner_step(heights.T), _inner_step(heights)),
         seam_energy=_seam_energy(heights),
         windows=(size_x / sigma_um, size_y / sigma_um),
     )
@@ -77,13 +79,11 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
 def measuring_bytes(extent: Extent, lambda_min_nm: float) -> int:
     """Computes the memory in which `measure` works, bytes.
 
-    Either the nine arrays of samples of `_seam_energy` (three of them complex, two real, one as a temporary), or, in
-    `periods`, six of samples, and six of those frequencies that views can reach.
+    The square deviations of `np.std`, or, in `periods`, the half of the transform along x that views can reach and
+    nine arrays of the frequencies that they can reach.
     """
-    kept = float(extent.samples)
-    for pitch in extent.pitch_um:
-        kept *= min(1.0, 2.0 * pitch * 2e3 / lambda_min_nm)
-    return 8 * round(max(9 * extent.samples, 5 * extent.samples + 5.5 * kept))
+    share_x, share_y = (min(1.0, 2.0 * pitch * 2e3 / lambda_min_nm) for pitch in extent.pitch_um)
+    return 8 * round(extent.samples * max(1.0, share_x + 9 * share_x * share_y))
 
 
 def _seam_energy(heights: Array) -> float:
@@ -93,15 +93,33 @@ def _seam_energy(heights: Array) -> float:
     surface.
     """
     ny, nx = heights.shape
-    turn_x, turn_y = (2.0 * np.pi * np.arange(n) / n for n in (nx, ny))
+    # heights are real: the other half of the columns holds conjugates, which counts a column twice
+    turn_x = 2.0 * np.pi * np.arange(nx // 2 + 1) / nx
+    turn_y = 2.0 * np.pi * np.arange(ny) / ny
+    twice = np.full(nx // 2 + 1, 2.0)
+    twice[[0, *([-1] if nx % 2 == 0 else [])]] = 1.0
     # the sources lie in two rows and two columns, so that one-dimensional transforms suffice
-    rows = fourier.fft(heights[-1] - heights[0]) * (1.0 - np.exp(1j * turn_y))[:, None]
-    columns = fourier.fft(heights[:, -1] - heights[:, 0])[:, None] * (1.0 - np.exp(1j * turn_x))
-    waves = 2.0 * np.cos(turn_y)[:, None] + 2.0 * np.cos(turn_x)
-    waves[0, 0] = np.inf  # removes the mean, for which waves - 4 would be 0
-    smooth = float(np.sum(np.abs((rows + columns) / (waves - 4.0)) ** 2)) / heights.size**2
+    across, along = fourier.fft(heights[-1] - heights[0])[: nx // 2 + 1], fourier.fft(heights[:, -1] - heights[:, 0])
+    step_x, step_y = 1.0 - np.exp(1j * turn_x), 1.0 - np.exp(1j * turn_y)
+    smooth = 0.0
+    for first in range(0, ny, _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
+        sources = across * step_y[rows, None] + along[rows, None] * step_x
+        waves = 2.0 * np.cos(turn_y[rows])[:, None] + 2.0 * np.cos(turn_x)
+        if first == 0:
+            waves[0, 0] = np.inf  # removes the mean, for which waves - 4 would be 0
+        smooth += float(np.sum(twice * (sources.real**2 + sources.imag**2) / (waves - 4.0) ** 2))
+    smooth /= heights.size**2
     variance = float(np.var(heights))
     return smooth / variance if variance > 0.0 else 0.0
+
+
+def _inner_step(lines: Array) -> float:
+    """Computes the root mean square of the differences between neighbouring lines (n, length)."""
+    total = 0.0
+    for first in range(0, len(lines) - 1, _ROWS_AT_ONCE):
+        total += float(np.sum(np.diff(lines[first : first + _ROWS_AT_ONCE + 1], axis=0) ** 2))
+    return sqrt(total / max(1, (len(lines) - 1) * lines.shape[1]))
 
 
 def _rms(values: Array) -> float:
