@@ -156,7 +156,7 @@ class Reference:
         Raises AccuracyError if the samples do not resolve the window, ResourceError if the stack does not fit into
         memory, and DeviceError if no device works.
         """
-        self.field, self._sigma_um, self._lambda_min_nm, self._places = field, sigma_um, lambda_min_nm, places
+        self.field, self.places, self._sigma_um, self._lambda_min_nm = field, places, sigma_um, lambda_min_nm
         self._size, self._progress = size(field.extent, sigma_um, lambda_min_nm, places), progress
         self._held: tuple[dft_stack.Stack, windowed_dft.DeviceStack] | None = None
         if self._size.is_held:
@@ -178,7 +178,7 @@ class Reference:
 
         uvw: (directions, 3), as many as fit into memory with L. lambda_nm: (L,), nm.
         """
-        return self._answers([Query(uvw, lambda_nm, self._places)])[0]
+        return self._answers([Query(uvw, lambda_nm, self.places)])[0]
 
     def xyz(
         self,
@@ -211,7 +211,7 @@ class Reference:
         light, material, wi, wr: as in `xyz`, as many directions as fit into memory. uvw, lambda_nm: as in `power`.
         """
         quadrature = trapezoid(light, STEP_NM)
-        many = Query(geometry.uvw(wi, wr), quadrature.lambda_nm, self._places)
+        many = Query(geometry.uvw(wi, wr), quadrature.lambda_nm, self.places)
         power, middle = self._answers([many, Query(uvw, lambda_nm, MIDDLE)])
         return integrate(power, quadrature, material, self._sigma_um, wi, wr), middle
 

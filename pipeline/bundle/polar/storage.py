@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.accuracy.certificate import refuse_clamping
-from pipeline.accuracy.checks import MIRROR_FLOOR, RANDOM_DIRECTIONS, RandomCheck, check_random, relative_error
+from pipeline.accuracy.checks import MIRROR_FLOOR, RandomCheck, check_random, random_directions, relative_error
 from pipeline.arrays import Array
 from pipeline.bundle import half
 from pipeline.bundle.polar.layout import PolarLoss
@@ -136,7 +136,7 @@ class _Measure:
 
     def __init__(self, config: Config, table: PolarTable, reference: Reference) -> None:
         self._config, self._most, self._unit = config, most_textures(table), config.radiometry.unit
-        self._wi, self._wr = random_pairs(config.scene, RANDOM_DIRECTIONS, _SEED)
+        self._wi, self._wr = random_pairs(config.scene, random_directions(reference.places.count), _SEED)
         self._truth = reference.xyz(config.light, config.material, self._wi, self._wr)
         evaluate = table_evaluator(table, config.radiometry)
         self._mirrored = self._wi * [-1.0, -1.0, 1.0]
