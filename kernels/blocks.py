@@ -1,36 +1,42 @@
 """Constants that the kernels are compiled with for speed: blocks of loops written out, whose sums stay in registers.
 
-Kernels work on vectors of 64 bytes, which take one of 32 registers with AVX-512 and two of 16 with AVX2. Blocks that
-fit the smaller set are as fast with the larger one, to the noise of the measurement, and compile a tenth faster: one
-set serves both. `diffract-bake bench speed` times every constant beside another value.
+Registers hold 16 floats with AVX-512, and there are 32 of them; with AVX2 there are 16 of 8, and sums of a tile's
+azimuths, vectors of 16 floats, take two each. The kernels of the stack work on vectors of one register.
+`diffract-bake bench speed` times every constant beside another value.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# dft_stack: STEP of the first step's k1, with sums of two vectors, and KEPT frequencies of the second step, with two.
-# polar_power_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose loop along x is written out.
-# spectral_operator: W_BLOCK nodes of w with two vectors.
-_CHOSEN = {
-    "STEP": 2,
-    "KEPT": 2,
-    "USUAL_TAPS": 7,
-    "W_BLOCK": 2,
-}
-# what fills 32 registers; and no window of its own
-OTHERS = {
-    "STEP": 10,
-    "KEPT": 10,
-    "USUAL_TAPS": 0,
-    "W_BLOCK": 4,
-}
+# dft_stack: K_PAIRS of frequencies, four registers each.
+# polar_power_spectrum: USUAL_TAPS, 2 reach_x + 1 of a patch of four sigma, whose loop along x is written out; NODES
+#   in s, four vectors of azimuths each.
+# spectral_operator: W_BLOCK nodes of w, two vectors of azimuths each; XYZ_HALVES, for each a vector of X, Y and Z.
+# Milliseconds of one core of an AMD EPYC (Zen 4), of each kernel with these and with other values, *Elaphe* 1332^2:
+#   512 bits: K_PAIRS 5 40.8 (2 42.3, 3 42.1, 4 42.9); NODES 2 29.7 (1 30.5); W_BLOCK 4 33.6 (2 40.8, 8 34.0)
+#   256 bits: K_PAIRS 3 53.0 (2 57.7, 4 59.8, 5 60.5); NODES 1 32.1 (2 33.9); W_BLOCK 2 44.3 (1 50.3, 4 55.7);
+#             XYZ_HALVES 1 39.7 (2 45.6)
+_WIDE = {"K_PAIRS": 5, "USUAL_TAPS": 7, "NODES": 2, "W_BLOCK": 4, "XYZ_HALVES": 2}
+_NARROW = {"K_PAIRS": 3, "USUAL_TAPS": 7, "NODES": 1, "W_BLOCK": 2, "XYZ_HALVES": 1}
+_WIDE_VECTOR = 16  # floats
 
 
 class Blocks:
     """The values of these constants on one device."""
 
-    def __init__(self) -> None:
-        self._values = dict(_CHOSEN)
+    def __init__(self, vector_width: int) -> None:
+        wide = vector_width >= _WIDE_VECTOR
+        self.vector_width = vector_width
+        # those of the other kind of processor; and no window of its own
+        self.others = {**(_NARROW if wide else _WIDE), "USUAL_TAPS": 0}
+        self._values = dict(_WIDE if wide else _NARROW)
+
+    def lanes(self, itemsize: int) -> int:
+        """Return how many numbers of `itemsize` bytes a vector has: those of a register, a line of the cache at most.
+
+        OpenCL has no vectors of one.
+        """
+        return min(64, max(2 * itemsize, 4 * self.vector_width)) // itemsize
 
     def chosen(self, *names: str) -> dict[str, int]:
         """Return the values of some constants, by their names in the kernels."""

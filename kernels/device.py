@@ -150,8 +150,8 @@ class Device:
     shares_memory: bool
     context: Any
     queue: Any
+    blocks: Blocks
     memory: MemoryPool = field(default_factory=MemoryPool)
-    blocks: Blocks = field(default_factory=Blocks)
     _timings: list[list[Launch]] = field(default_factory=list)
 
     @contextmanager
@@ -185,8 +185,9 @@ def default_device() -> Device:
         if not probe.fault:
             queue = _opencl().CommandQueue(probe.context)
             shares = bool(queue.device.host_unified_memory)
-            sizes = probe.vector_width, queue.device.max_mem_alloc_size
-            return Device(probe.device, probe.driver, probe.compute_units, *sizes, shares, probe.context, queue)
+            sizes = probe.compute_units, probe.vector_width, queue.device.max_mem_alloc_size
+            blocks = Blocks(probe.vector_width)
+            return Device(probe.device, probe.driver, *sizes, shares, probe.context, queue, blocks)
     tried = "; ".join(f"{probe.device}: {probe.fault}" for probe in probes)
     raise NoDeviceError(_why_none(wanted, [device.name.strip() for _, device in listed], tried))
 

@@ -9,7 +9,7 @@ _MOST_W_TERMS = 136  # a config may ask for 128, and planning looks a few furthe
 # coefficients under a window along an axis: 2e-11 on a patch of thirty sigma, the widest of a stack, takes 69
 MOST_TAPS = 69
 
-MOST_PAIRS = 128  # of samples and their mirror images in the first step of a transform: n1 / 2 + 1 of n = n1 n2
+LANES = 16  # azimuths of a tile, and terms of a block: floats of a line of the cache
 CHANNELS = 3  # X, Y and Z
 ORDER = 8  # nodes of every interpolation of the spectral operator, over r and along kappa
 MOST_RINGS = 8  # of a group of rings, whose sums stay in the nearest cache
@@ -21,8 +21,9 @@ def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Pr
     term_blocks, s_nodes, w_terms: blocks of 16 Chebyshev terms, nodes in s and terms in |w| that it must hold.
     """
     constants = {
-        **_stack("float", 16),
-        **device.default_device().blocks.chosen("USUAL_TAPS", "W_BLOCK"),
+        **_stack("float", 4),
+        **device.default_device().blocks.chosen("USUAL_TAPS", "NODES", "W_BLOCK", "XYZ_HALVES"),
+        "LANES": LANES,
         "MOST_BLOCKS": device.bound(term_blocks, _MOST_BLOCKS),
         "MOST_S_NODES": device.bound(s_nodes, _MOST_S_NODES),
         "MOST_W_TERMS": device.bound(w_terms, _MOST_W_TERMS),
@@ -39,7 +40,7 @@ def exact() -> device.Program:
     return device.program(("dft_stack.cl", "exact_power.cl"), {**_stack("double", 8), "MOST_TAPS": MOST_TAPS})
 
 
-def _stack(real: str, lanes: int) -> dict[str, int | str]:
-    """Constants of dft_stack.cl, whose vectors of `lanes` numbers have 64 bytes."""
-    sizes = device.default_device().blocks.chosen("STEP", "KEPT")
-    return {"REAL": real, "LANES": lanes, "MOST_PAIRS": MOST_PAIRS, **sizes}
+def _stack(real: str, itemsize: int) -> dict[str, int | str]:
+    """Constants of dft_stack.cl."""
+    blocks = device.default_device().blocks
+    return {"REAL": real, "WIDTH": blocks.lanes(itemsize), **blocks.chosen("K_PAIRS")}

@@ -2,44 +2,53 @@
  *
  *   T_n Chebyshev's polynomials, t = h / H;  x and y count from the middle sample
  *
- * Terms lie side by side in the lanes of one vector, so every sum is a sum of whole vectors and nothing is ever
- * transposed. A transform of N samples goes in two steps, N = N1 N2 (Cooley & Tukey 1965), each a small dense product:
+ * Terms are adjacent in the lanes of a vector, so every sum is a sum of whole vectors, and only terms are transposed,
+ * as they are made. A transform of N = N1 N2 N3 samples takes three levels (Cooley & Tukey 1965):
  *
- *   A[k1][n2] = sum_n1 a[n1 N2 + n2] exp(2 pi i n1 k1 / N1)
- *   F[k]      = sum_n2 A[k mod N1][n2] exp(2 pi i n2 k / N)       for the k kept
+ *   A[k1][n2, n3] = sum_n1 a[(n1 N2 + n2) N3 + n3] exp(2 pi i n1 k1 / N1)
+ *   B[k][n3]      = sum_n2 A[k1][n2, n3] exp(2 pi i n2 k1 / (N1 N2)) exp(2 pi i n2 k2 / N2),     k = k1 + N1 k2
+ *   F[k + N1 N2 k3] = sum_n3 B[k][n3] exp(2 pi i n3 k / N) exp(2 pi i n3 k3 / N3)                for those kept
  *
- * The first pairs n1 with N1 - n1: cosines meet their sum, sines their difference, and k1 serves N1 - k1 too, so
- * N1 / 2 + 1 of either are left. Frequencies of one k1 are taken KEPT at a time, as a block.
+ * The first two are done for one n3 after the other, on a few vectors in the nearest cache. Each level is a dense
+ * transform of few points. It is folded before it is summed: points j and N1 - j have the same cosine and opposite
+ * sines, hence a sum and a difference of them meet half of the factors, and the frequencies k and N1 - k share both
+ * results. Where N1 is even, points j and j + N1 / 2 are added first for even k, and subtracted for odd k.
  *
  * along_x transforms the rows of samples along x; along_y transforms the columns phi = 0 .. columns - 1 of what it
- * wrote along y, and stores small phi at -phi, too, for heights are real. Work-items take rows or columns
- * get_global_size(0) apart, each with scratch of its own: they outgrow the stacks of a driver's threads. Arguments:
+ * wrote along y, and stores small phi at -phi, too, for heights are real. Real samples need k1 <= N1 / 2 alone, and the
+ * frequencies -k follow. Work-items take rows or columns get_global_size(0) apart, each with scratch of its own.
+ * Arguments:
  *
  * along_x
  *   heights     double[ny][nx]                  um    centred
  *   scale       double                          1/um  1 / H
- *   first       int                             1     the first of the terms made here, LANES of them
- *   cosine      REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
- *   sine        REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
- *   turn        REAL[blocks][n2][KEPT][2]       1     cosine and sine of 2 pi n2 k / N
- *   first_of    int[blocks]                     1     the k1 of a block
- *   place       int[blocks][KEPT]               1     the column of each k; -1 for none
+ *   first       int                             1     the first of the terms made here, TERMS of them
+ *   factors     REAL[]                          1     cosines and sines of the levels, one after the other:
+ *                                                     [sets][blocks][entries - 1][K_PAIRS][2]
+ *   turn        REAL[n1 + n1 n2 + n][2]         1     cosine and sine of 0, [n1]; of 2 pi n2 k1 / (N1 N2), [k1][n2];
+ *                                                     and of 2 pi n3 k / N, [k][n3]
+ *   of          int[tiles]                      1     the k of a tile of the last level
+ *   place       int[tiles][sets][blocks][K_PAIRS][2]    1     the column of each frequency, those of -k3 second; -1 for
+ *                                                     none, and -2 - column for that of its negative
  *   axis        Axis                            1     sizes along x
  *   ny          int                             1     rows
- *   scratch     VECTOR[work-items][room]        1     room >= 3 nx
+ *   along       int2                            1     N1 N2 and N3 along y: the order of rows in `narrow`
+ *   tall        int                             1     rows of `narrow` from column to column
+ *   scratch     VECTOR[work-items][room]        1     room as `transform` computes it
  *   room        long                            1     vectors of scratch of a work-item
- *   narrow      VECTOR[columns][ny][2]          1     result: real and imaginary part, y from the middle sample on
+ *   narrow      VECTOR[columns][tall][GROUPS][2]  1   result: real and imaginary part; row y, counted from the middle
+ *                                                     sample, is at (y mod N3) N1 N2 + y / N3
  *
  * along_y
- *   narrow      VECTOR[columns][ny][2]          1     as along_x wrote it
- *   cosine      REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
- *   sine        REAL[pairs][padded]             1     of 2 pi n1 k1 / N1
- *   turn        REAL[blocks][n2][KEPT][2]       1     cosine and sine of 2 pi n2 k / N
- *   first_of    int[blocks]                     1     the k1 of a block
- *   place       int[blocks][KEPT]               1     the row of each k; -1 for none
+ *   narrow      VECTOR[columns][tall][GROUPS][2]  1   as along_x wrote it
+ *   factors     REAL[]                          1     as above, along y
+ *   turn        REAL[n1 + n1 n2 + n][2]         1     as above, along y
+ *   of          int[tiles]                      1     the k of a tile of the last level
+ *   place       int[tiles][sets][blocks][K_PAIRS][2]    1     the row of each frequency; -1 for none
  *   axis        Axis                            1     sizes along y
  *   columns     int                             1     of narrow
- *   scratch     VECTOR[work-items][room]        1     room >= 2 ny
+ *   tall        int                             1     rows of `narrow` from column to column
+ *   scratch     VECTOR[work-items][room]        1     as above
  *   room        long                            1     vectors of scratch of a work-item
  *   first       int                             1     the first of the terms made here
  *   terms       int                             1     of the stack; those beyond are not stored
@@ -49,20 +58,44 @@
  *   mean        REAL                            1     1 / samples
  *   stack       REAL[rows][reach + phi_max + 1][2][terms]   1   result: F_n, real and imaginary parts
  *
- * Set by the host: REAL and LANES, a vector of 64 bytes; STEP, the k1 of real samples that are summed at a time; KEPT;
- * MOST_PAIRS, which bounds pairs.
+ * Set by the host: REAL and WIDTH, one vector register of the device; K_PAIRS, the pairs of frequencies k and -k whose
+ * sums stay in registers, four vectors each.
  */
 
 #include "common.cl"
-#define VECTOR NAME(REAL, LANES)
+#define VECTOR NAME(REAL, WIDTH)
+#define REAL8 NAME(REAL, 8)
+#define TERMS (64 / (int)sizeof(REAL)) /* made at a time: a line of the cache */
+#define GROUPS (TERMS / WIDTH)         /* vectors of them */
 
-/* n = n1 n2 samples; pairs = n1 / 2 + 1, padded to whole steps; blocks of frequencies */
+/* What one kernel writes and the other reads is larger than caches: lines written past them need not be read first, and
+ * lines that are wanted next are asked for in time. */
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_nontemporal_store) && __has_builtin(__builtin_prefetch)
+#define STREAM(value, to) __builtin_nontemporal_store(value, to)
+#define PREFETCH(at) __builtin_prefetch((const void *)(uintptr_t)(at))
+#endif
+#endif
+#ifndef STREAM
+#define STREAM(value, to) (*(to) = (value))
+#define PREFETCH(at)
+#endif
+
+/* A transform of few points, folded to `sets` (1, or 2 of even and of odd frequencies) of `entries`, whose frequencies
+ * are taken as `blocks` of K_PAIRS. */
 typedef struct {
-    int n, n1, n2, pairs, padded, blocks;
+    int points, sets, entries, blocks;
+} Level;
+
+/* n samples; its levels; tiles of the last one, whose rows are `stride` apart */
+typedef struct {
+    int n;
+    Level first, second, last;
+    int tiles, stride;
 } Axis;
 
 /* T_first and T_(first - 1) of t, doubling the order: T_2n = 2 T_n^2 - 1, T_(2n - 1) = 2 T_n T_(n-1) - t */
-static void chebyshev(const double8 t, const int first, double8 *term, double8 *before) {
+static INLINE void chebyshev(const double8 t, const int first, double8 *term, double8 *before) {
     double8 here = 1.0, below = t;
     ROLLED for (int bit = first ? 31 - clz(first) : -1; bit >= 0; --bit) {
         /* from T_n, T_(n - 1) to orders 2 n, 2 n - 1, and one further where the bit is set */
@@ -75,178 +108,324 @@ static void chebyshev(const double8 t, const int first, double8 *term, double8 *
     *before = below;
 }
 
-/* Terms first .. first + LANES - 1 of DOUBLES samples t: out[sample][term]. */
+/* Rows and columns of eight vectors change places: halves, pairs and single lanes in turn. */
+static INLINE void transpose8(REAL8 *m) {
+    UNROLL for (int i = 0; i < 4; ++i) {
+        const REAL8 a = m[i], b = m[i + 4];
+        m[i] = (REAL8)(a.s0123, b.s0123);
+        m[i + 4] = (REAL8)(a.s4567, b.s4567);
+    }
+    UNROLL for (int i = 0; i < 4; ++i) {
+        const int k = (i & 1) + 2 * (i & 2);
+        const REAL8 a = m[k], b = m[k + 2];
+        m[k] = (REAL8)(a.s01, b.s01, a.s45, b.s45);
+        m[k + 2] = (REAL8)(a.s23, b.s23, a.s67, b.s67);
+    }
+    UNROLL for (int i = 0; i < 4; ++i) {
+        const REAL8 a = m[2 * i], b = m[2 * i + 1];
+        m[2 * i] = (REAL8)(a.s0, b.s0, a.s2, b.s2, a.s4, b.s4, a.s6, b.s6);
+        m[2 * i + 1] = (REAL8)(a.s1, b.s1, a.s3, b.s3, a.s5, b.s5, a.s7, b.s7);
+    }
+}
+
+/* Terms first .. first + TERMS - 1 of DOUBLES samples t: out[sample][term]. */
 static APART void terms_of(const double8 t, const int first, __global REAL *out) {
-    double8 before, term;
+    double8 term, before;
     chebyshev(t, first, &term, &before);
-    ROLLED for (int n = 0; n < LANES; ++n) {
-        UNROLL for (int i = 0; i < DOUBLES; ++i) out[i * LANES + n] = ((const double *)&term)[i];
-        const double8 next = 2.0 * t * term - before;
-        before = term;
-        term = next;
+    const double8 twice = 2.0 * t;
+    ROLLED for (int n = 0; n < TERMS; n += 8) {
+        REAL8 m[8];
+        UNROLL for (int i = 0; i < 8; ++i) {
+            m[i] = NAME(convert_, REAL8)(term);
+            const double8 next = twice * term - before;
+            before = term;
+            term = next;
+        }
+        transpose8(m);
+        UNROLL for (int i = 0; i < DOUBLES; ++i) vstore8(m[i], 0, out + i * TERMS + n);
     }
 }
 
-/* Samples n1 = 0 .. and their mirror images N1 - n1, `stride` apart: sums and differences, `parts` vectors each. */
-static INLINE void pair(__global const VECTOR *sample, const long stride, const Axis axis, const int parts, VECTOR *sum,
-                        VECTOR *difference) {
-    ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1) {
-        const int alone = n1 == 0 || 2 * n1 == axis.n1;
-        UNROLL for (int part = 0; part < parts; ++part) {
-            const VECTOR here = sample[n1 * stride + part];
-            const VECTOR mirrored = alone ? (VECTOR)0 : sample[(axis.n1 - n1) * stride + part];
-            sum[n1 * parts + part] = here + mirrored;
-            difference[n1 * parts + part] = alone ? (VECTOR)0 : here - mirrored;
+/* Point j of a level, times its turn; real points have none. */
+static INLINE void point(__global const VECTOR *x, const long stride, const int parts, __global const REAL *turn,
+                         const int j, VECTOR *p) {
+    const VECTOR re = x[j * stride];
+    p[0] = re;
+    if (parts == 1) return;
+    const VECTOR im = x[j * stride + 1];
+    p[1] = im;
+    const VECTOR c = turn[2 * j], s = turn[2 * j + 1];
+    p[0] = fma(-s, im, c * re);
+    p[1] = fma(s, re, c * im);
+}
+
+/* The sum and the difference of points j and k, of j alone where `alone`. */
+static INLINE void pair(__global const VECTOR *x, const long stride, const int parts, __global const REAL *turn,
+                        const int j, const int k, const int alone, VECTOR *sum, VECTOR *difference) {
+    VECTOR p[PARTS], q[PARTS];
+    point(x, stride, parts, turn, j, p);
+    UNROLL for (int i = 0; i < parts; ++i) q[i] = 0;
+    if (!alone) point(x, stride, parts, turn, k, q);
+    UNROLL for (int i = 0; i < parts; ++i) {
+        sum[i] = p[i] + q[i];
+        difference[i] = p[i] - q[i];
+    }
+}
+
+/* The points of a level, `stride` apart, as sums and differences [set][entry][sum, difference][part]. */
+static INLINE void fold(__global const VECTOR *x, const long stride, const int parts, __global const REAL *turn,
+                        const Level level, __global VECTOR *folded) {
+    const int n = level.points, n_2 = n / 2;
+    __global VECTOR *odd = folded + 2 * parts * level.entries;
+    ROLLED for (int j = 0; j < level.entries; ++j, folded += 2 * parts, odd += 2 * parts) {
+        VECTOR u[PARTS], v[PARTS], mirrored_u[PARTS], mirrored_v[PARTS];
+        if (level.sets == 1) {
+            pair(x, stride, parts, turn, j, n - j, j == 0, u, v);
+            UNROLL for (int i = 0; i < parts; ++i) {
+                folded[i] = u[i];
+                folded[parts + i] = v[i];
+            }
+            continue;
+        }
+        pair(x, stride, parts, turn, j, j + n_2, 0, u, v);
+        UNROLL for (int i = 0; i < parts; ++i) mirrored_u[i] = mirrored_v[i] = 0;
+        if (j > 0 && 2 * j < n_2) pair(x, stride, parts, turn, n_2 - j, n - j, 0, mirrored_u, mirrored_v);
+        UNROLL for (int i = 0; i < parts; ++i) {
+            folded[i] = u[i] + mirrored_u[i];
+            folded[parts + i] = u[i] - mirrored_u[i];
+            odd[i] = v[i] - mirrored_v[i];
+            odd[parts + i] = v[i] + mirrored_v[i];
         }
     }
 }
 
-/* The first step's sums over n1 at `step` of its k1: cosines with sums, sines with differences; [k1][part] each. */
-static INLINE void sums_over_n1(const VECTOR *sum, const VECTOR *difference, __global const REAL *cosine,
-                                __global const REAL *sine, const Axis axis, const int parts, const int step, VECTOR *c,
-                                VECTOR *s) {
-    VECTOR even[PARTS * STEP], odd[PARTS * STEP];
-    UNROLL for (int j = 0; j < parts * step; ++j) even[j] = odd[j] = 0;
-    ROLLED for (int n1 = 0; n1 < axis.pairs; ++n1)
-        UNROLL for (int j = 0; j < step; ++j) {
-            const VECTOR c_j = cosine[n1 * axis.padded + j], s_j = sine[n1 * axis.padded + j];
-            UNROLL for (int part = 0; part < parts; ++part) {
-                even[parts * j + part] = fma(c_j, sum[n1 * parts + part], even[parts * j + part]);
-                odd[parts * j + part] = fma(s_j, difference[n1 * parts + part], odd[parts * j + part]);
+static APART void fold_real(__global const VECTOR *x, const long stride, const Level level, __global VECTOR *folded) {
+    fold(x, stride, 1, 0, level, folded);
+}
+
+static APART void fold_complex(__global const VECTOR *x, const long stride, __global const REAL *turn,
+                               const Level level, __global VECTOR *folded) {
+    fold(x, stride, PARTS, turn, level, folded);
+}
+
+/* A block of K_PAIRS frequencies: f[pair][k, -k][part]. */
+static APART void sum_complex(__global const VECTOR *folded, __global const REAL *factors, const int entries,
+                              VECTOR (*f)[2][PARTS]) {
+    VECTOR c[K_PAIRS][PARTS], s[K_PAIRS][PARTS];
+    UNROLL for (int k = 0; k < K_PAIRS; ++k) UNROLL for (int part = 0; part < PARTS; ++part) {
+        c[k][part] = folded[part];
+        s[k][part] = 0;
+    }
+    ROLLED for (int j = 1; j < entries; ++j, factors += 2 * K_PAIRS) {
+        folded += 2 * PARTS;
+        const VECTOR sum_re = folded[0], sum_im = folded[1], difference_re = folded[2], difference_im = folded[3];
+        UNROLL for (int k = 0; k < K_PAIRS; ++k) {
+            const VECTOR cosine = factors[2 * k], sine = factors[2 * k + 1];
+            c[k][0] = fma(cosine, sum_re, c[k][0]);
+            c[k][1] = fma(cosine, sum_im, c[k][1]);
+            s[k][0] = fma(sine, difference_re, s[k][0]);
+            s[k][1] = fma(sine, difference_im, s[k][1]);
+        }
+    }
+    UNROLL for (int k = 0; k < K_PAIRS; ++k) {
+        f[k][0][0] = c[k][0] - s[k][1];
+        f[k][0][1] = c[k][1] + s[k][0];
+        f[k][1][0] = c[k][0] + s[k][1];
+        f[k][1][1] = c[k][1] - s[k][0];
+    }
+}
+
+/* The same of real points, whose frequencies -k are not wanted. */
+static APART void sum_real(__global const VECTOR *folded, __global const REAL *factors, const int entries,
+                           VECTOR (*f)[2][PARTS]) {
+    VECTOR c[K_PAIRS], s[K_PAIRS];
+    UNROLL for (int k = 0; k < K_PAIRS; ++k) {
+        c[k] = folded[0];
+        s[k] = 0;
+    }
+    ROLLED for (int j = 1; j < entries; ++j, factors += 2 * K_PAIRS) {
+        folded += 2;
+        const VECTOR sum = folded[0], difference = folded[1];
+        UNROLL for (int k = 0; k < K_PAIRS; ++k) {
+            c[k] = fma((VECTOR)factors[2 * k], sum, c[k]);
+            s[k] = fma((VECTOR)factors[2 * k + 1], difference, s[k]);
+        }
+    }
+    UNROLL for (int k = 0; k < K_PAIRS; ++k) {
+        f[k][0][0] = c[k];
+        f[k][0][1] = s[k];
+    }
+}
+
+/* Where the factors of the next level begin. */
+static int factors_of(const Level level) { return level.sets * level.blocks * (level.entries - 1) * K_PAIRS * 2; }
+
+/* Every frequency of a folded level, `stride` vectors apart; of real points, those up to half of the points. */
+static INLINE void write_level(__global const VECTOR *folded, __global const REAL *factors, const Level level,
+                               const int parts, __global VECTOR *to, const long stride) {
+    const int each = (level.entries - 1) * K_PAIRS * 2;
+    ROLLED for (int set = 0; set < level.sets; ++set, folded += 2 * parts * level.entries)
+        ROLLED for (int block = 0; block < level.blocks; ++block, factors += each) {
+            VECTOR f[K_PAIRS][2][PARTS];
+            if (parts == 1) sum_real(folded, factors, level.entries, f);
+            else sum_complex(folded, factors, level.entries, f);
+            ROLLED for (int i = 0; i < K_PAIRS; ++i) {
+                const int k = set + level.sets * (block * K_PAIRS + i);
+                if (2 * k > level.points) break;
+                to[k * stride] = f[i][0][0];
+                to[k * stride + 1] = f[i][0][1];
+                if (parts == 1 || k == 0 || 2 * k == level.points) continue;
+                to[(level.points - k) * stride] = f[i][1][0];
+                to[(level.points - k) * stride + 1] = f[i][1][1];
             }
         }
-    UNROLL for (int j = 0; j < parts * step; ++j) {
-        c[j] = even[j];
-        s[j] = odd[j];
+}
+
+static APART void write_real(__global const VECTOR *folded, __global const REAL *factors, const Level level,
+                             __global VECTOR *to, const long stride) {
+    write_level(folded, factors, level, 1, to, stride);
+}
+
+static APART void write_complex(__global const VECTOR *folded, __global const REAL *factors, const Level level,
+                                __global VECTOR *to, const long stride) {
+    write_level(folded, factors, level, PARTS, to, stride);
+}
+
+/* The first and the second level of samples of one n3, `stride` apart: B[k][n3] at b, of real samples with k1 <= N1 / 2
+ * alone. */
+static INLINE void first_levels(__global const VECTOR *sample, const long stride, const int parts,
+                                __global const REAL *factors, __global const REAL *turn, const Axis axis,
+                                __global VECTOR *scratch, __global VECTOR *b) {
+    const int n1 = axis.first.points, n2 = axis.second.points;
+    __global VECTOR *a = n2 == 1 ? b : scratch, *folded = scratch + PARTS * n1 * n2;
+    const long a_stride = PARTS * (n2 == 1 ? axis.stride : n2), b_stride = PARTS * axis.stride;
+    ROLLED for (int j = 0; j < n2; ++j) {
+        if (parts == 1) {
+            fold_real(sample + j * stride, n2 * stride, axis.first, folded);
+            write_real(folded, factors, axis.first, a + PARTS * j, a_stride);
+        } else {
+            fold_complex(sample + j * stride, n2 * stride, turn, axis.first, folded);
+            write_complex(folded, factors, axis.first, a + PARTS * j, a_stride);
+        }
+    }
+    if (n2 == 1) return;
+    ROLLED for (int k1 = 0; k1 < (parts == 1 ? n1 / 2 + 1 : n1); ++k1) {
+        fold_complex(a + k1 * a_stride, PARTS, turn + 2 * (n1 + k1 * n2), axis.second, folded);
+        write_complex(folded, factors + factors_of(axis.first), axis.second, b + k1 * b_stride, n1 * b_stride);
     }
 }
 
-/* A[k1][n2] = c + i s and A[N1 - k1][n2] = c - i s, of real samples (parts = 1) or of complex ones (2). */
-static INLINE void store_pair(const VECTOR *c, const VECTOR *s, const int k1, const int n2, const Axis axis,
-                              const int parts, __global VECTOR *a) {
-    if (k1 >= axis.pairs) return;
-    const VECTOR im_c = parts == PARTS ? c[1] : (VECTOR)0, im_s = parts == PARTS ? s[1] : (VECTOR)0;
-    __global VECTOR *here = a + PARTS * (k1 * axis.n2 + n2);
-    __global VECTOR *mirrored = a + PARTS * ((axis.n1 - k1) * axis.n2 + n2);
-    here[0] = c[0] - im_s;
-    here[1] = im_c + s[0];
-    if (k1 > 0 && 2 * k1 < axis.n1) {
-        mirrored[0] = c[0] + im_s;
-        mirrored[1] = im_c - s[0];
-    }
-}
-
-/* The first step: A[k1][n2] of every k1 and n2, real and imaginary part. */
-static INLINE void first_step(__global const VECTOR *sample, __global const REAL *cosine, __global const REAL *sine,
-                              const Axis axis, const int parts, const int step, __global VECTOR *a) {
-    ROLLED for (int n2 = 0; n2 < axis.n2; ++n2) {
-        VECTOR sum[PARTS * MOST_PAIRS], difference[PARTS * MOST_PAIRS];
-        pair(sample + parts * n2, parts * axis.n2, axis, parts, sum, difference);
-        ROLLED for (int k = 0; k < axis.pairs; k += step) {
-            VECTOR c[PARTS * STEP], s[PARTS * STEP];
-            sums_over_n1(sum, difference, cosine + k, sine + k, axis, parts, step, c, s);
-            ROLLED for (int j = 0; j < step; ++j) store_pair(c + parts * j, s + parts * j, k + j, n2, axis, parts, a);
+/* t of a row in order of n3: t[n3][n1 N2 + n2], whose rows are `length` apart. */
+static APART void order_row(const long next, __global const double *row, const double scale, const Axis axis, const int length,
+                            __global double *t) {
+    int x = axis.n / 2;
+    ROLLED for (int j = 0; j < axis.n / axis.last.points; ++j) {
+        /* the row that a work-item takes next */
+        ROLLED for (int i = 0; i < axis.last.points; i += DOUBLES) PREFETCH(row + next + j * axis.last.points + i);
+        ROLLED for (int n3 = 0; n3 < axis.last.points; ++n3) {
+            t[n3 * length + j] = scale * row[x];
+            x = x + 1 < axis.n ? x + 1 : 0;
         }
     }
 }
 
-static APART void first_step_of_real(__global const VECTOR *sample, __global const REAL *cosine,
-                                     __global const REAL *sine, const Axis axis, __global VECTOR *a) {
-    first_step(sample, cosine, sine, axis, 1, STEP, a);
-}
+__kernel void along_x(__global const double *heights, const double scale, const int first,
+                      __global const REAL *factors, __global const REAL *turn, __global const int *of,
+                      __global const int *place, const Axis axis, const int ny, const int2 along, const int tall,
+                      __global VECTOR *scratch, const long room, __global VECTOR *narrow) {
+    const int points = axis.first.points * axis.second.points, n3 = axis.last.points;
+    __global VECTOR *b = scratch + get_global_id(0) * room, *sample = b + PARTS * GROUPS * points * axis.stride;
+    /* whole vectors of samples */
+    const int length = DOUBLES * ((points + DOUBLES - 1) / DOUBLES);
+    __global VECTOR *own = sample + GROUPS * length, *folded = own;
+    __global double *t = (__global double *)(scratch + (get_global_id(0) + 1) * room) - n3 * length;
+    __global const REAL *last = factors + factors_of(axis.first) + factors_of(axis.second);
+    __global const REAL *last_turn = turn + 2 * (axis.first.points + points);
+    const int each = (axis.last.entries - 1) * K_PAIRS * 2;
 
-/* Complex samples take one k1 at a time: their sums are as many vectors as those of two k1 of real ones. */
-static APART void first_step_of_complex(__global const VECTOR *sample, __global const REAL *cosine,
-                                        __global const REAL *sine, const Axis axis, __global VECTOR *a) {
-    first_step(sample, cosine, sine, axis, PARTS, 1, a);
-}
-
-/* The second step: F of the KEPT frequencies of a block, from the n2 values A of its k1: f[frequency][part]. */
-static APART void second_step(__global const VECTOR *a, __global const REAL *turn, const int n2s, VECTOR (*f)[PARTS]) {
-    VECTOR re[KEPT], im[KEPT];
-    UNROLL for (int q = 0; q < KEPT; ++q) re[q] = im[q] = 0;
-    ROLLED for (int n2 = 0; n2 < n2s; ++n2) {
-        const VECTOR a_re = a[PARTS * n2], a_im = a[PARTS * n2 + 1];
-        UNROLL for (int q = 0; q < KEPT; ++q) {
-            const VECTOR c = turn[2 * (n2 * KEPT + q)], s = turn[2 * (n2 * KEPT + q) + 1];
-            re[q] = fma(c, a_re, fma(-s, a_im, re[q]));
-            im[q] = fma(s, a_re, fma(c, a_im, im[q]));
+    ROLLED for (int i = 0; i < n3 * length; ++i) t[i] = 0.0;
+    ROLLED for (int at = get_global_id(0); at < ny; at += get_global_size(0)) {
+        const int y = at % along.x * along.y + at / along.x;
+        order_row((long)along.y * axis.n * get_global_size(0), heights + (long)((y + ny / 2) % ny) * axis.n, scale, axis, length, t);
+        ROLLED for (int j = 0; j < n3; ++j) {
+            ROLLED for (int i = 0; i < length; i += DOUBLES)
+                terms_of(vload8(0, t + j * length + i), first, (__global REAL *)(sample + i * GROUPS));
+            ROLLED for (int g = 0; g < GROUPS; ++g)
+                first_levels(sample + g, GROUPS, 1, factors, turn, axis, own,
+                             b + PARTS * (g * points * axis.stride + j));
         }
-    }
-    UNROLL for (int q = 0; q < KEPT; ++q) {
-        f[q][0] = re[q];
-        f[q][1] = im[q];
-    }
-}
-
-/* Terms of the samples of a row from x = begin to end, at sample[to + x]; DOUBLES at a time, and what spills over the
- * end is written again. */
-static INLINE void row_terms(__global const double *row, const double scale, const int first, const int begin,
-                             const int end, const int to, __global VECTOR *sample) {
-    ROLLED for (int x = begin; x < end; x += DOUBLES) {
-        double8 t = 0.0;
-        if (x + DOUBLES <= end) t = vload8(0, row + x);
-        else ROLLED for (int i = 0; i < end - x; ++i) ((double *)&t)[i] = row[x + i];
-        terms_of(scale * t, first, (__global REAL *)(sample + to + x));
-    }
-}
-
-__kernel void along_x(__global const double *heights, const double scale, const int first, __global const REAL *cosine,
-                      __global const REAL *sine, __global const REAL *turn, __global const int *first_of,
-                      __global const int *place, const Axis axis, const int ny, __global VECTOR *scratch,
-                      const long room, __global VECTOR *narrow) {
-    const int nx = axis.n, middle = nx / 2;
-    __global VECTOR *sample = scratch + get_global_id(0) * room, *a = sample + nx;
-
-    ROLLED for (int y = get_global_id(0); y < ny; y += get_global_size(0)) {
-        __global const double *row = heights + (long)((y + ny / 2) % ny) * nx;
-        /* the samples from the middle on, then those before it */
-        ROLLED for (int part = 0; part < 2; ++part)
-            row_terms(row, scale, first, part ? 0 : middle, part ? middle : nx, part ? nx - middle : -middle, sample);
-        first_step_of_real(sample, cosine, sine, axis, a);
-        ROLLED for (int b = 0; b < axis.blocks; ++b) {
-            VECTOR f[KEPT][PARTS];
-            second_step(a + (long)PARTS * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
-            ROLLED for (int q = 0; q < KEPT; ++q) {
-                const int column = place[b * KEPT + q];
-                if (column < 0) continue;
-                narrow[PARTS * ((long)column * ny + y)] = f[q][0];
-                narrow[PARTS * ((long)column * ny + y) + 1] = f[q][1];
+        ROLLED for (int tile = 0; tile < axis.tiles * GROUPS; ++tile) {
+            const int t = tile / GROUPS, g = tile % GROUPS, k = of[t];
+            fold_complex(b + PARTS * (g * points + k) * axis.stride, PARTS, last_turn + 2 * k * n3, axis.last, folded);
+            ROLLED for (int block = 0; block < axis.last.sets * axis.last.blocks; ++block) {
+                const int set = block / axis.last.blocks;
+                VECTOR f[K_PAIRS][2][PARTS];
+                sum_complex(folded + 2 * PARTS * axis.last.entries * set, last + block * each, axis.last.entries, f);
+                __global const int *columns = place + (t * axis.last.sets * axis.last.blocks + block) * K_PAIRS * 2;
+                ROLLED for (int i = 0; i < 2 * K_PAIRS; ++i) {
+                    const int negative = columns[i] < -1, column = negative ? -2 - columns[i] : columns[i];
+                    if (column < 0) continue;
+                    __global VECTOR *to = narrow + (((long)column * tall + at) * GROUPS + g) * PARTS;
+                    STREAM(f[i / 2][i % 2][0], to);
+                    STREAM(negative ? -f[i / 2][i % 2][1] : f[i / 2][i % 2][1], to + 1);
+                }
             }
         }
     }
 }
 
-/* The first `lit` lanes of a coefficient's real and imaginary parts, which are `terms` apart. */
-static APART void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
-    ROLLED for (int n = 0; n < lit; ++n) {
+/* A coefficient's real and imaginary parts, which are `terms` apart; the first `lit` lanes of either. */
+static INLINE void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
+    if (lit >= WIDTH && terms % WIDTH == 0) {
+        STREAM(re, (__global VECTOR *)to);
+        STREAM(im, (__global VECTOR *)(to + terms));
+    } else ROLLED for (int n = 0; n < lit; ++n) {
         to[n] = ((const REAL *)&re)[n];
         to[terms + n] = ((const REAL *)&im)[n];
     }
 }
 
-__kernel void along_y(__global const VECTOR *narrow, __global const REAL *cosine, __global const REAL *sine,
-                      __global const REAL *turn, __global const int *first_of, __global const int *place,
-                      const Axis axis, const int columns, __global VECTOR *scratch, const long room, const int first,
-                      const int terms, const int reach, const int phi_max, const int rows, const REAL mean,
-                      __global REAL *stack) {
-    __global VECTOR *a = scratch + get_global_id(0) * room;
-    const int lit = min(LANES, terms - first);
+__kernel void along_y(__global const VECTOR *narrow, __global const REAL *factors, __global const REAL *turn,
+                      __global const int *of, __global const int *place, const Axis axis, const int columns,
+                      const int tall, __global VECTOR *scratch, const long room, const int first, const int terms,
+                      const int reach, const int phi_max, const int rows, const REAL mean, __global REAL *stack) {
+    const int points = axis.first.points * axis.second.points, n3 = axis.last.points;
+    __global VECTOR *b = scratch + get_global_id(0) * room, *own = b + PARTS * points * axis.stride, *folded = own;
+    __global const REAL *last = factors + factors_of(axis.first) + factors_of(axis.second);
+    __global const REAL *last_turn = turn + 2 * (axis.first.points + points);
+    const int each = (axis.last.entries - 1) * K_PAIRS * 2;
     const long width = reach + phi_max + 1;
 
-    ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
-        first_step_of_complex(narrow + (long)PARTS * phi * axis.n, cosine, sine, axis, a);
-        ROLLED for (int b = 0; b < axis.blocks; ++b) {
-            VECTOR f[KEPT][PARTS];
-            second_step(a + (long)PARTS * first_of[b] * axis.n2, turn + (long)b * axis.n2 * KEPT * 2, axis.n2, f);
-            ROLLED for (int q = 0; q < KEPT; ++q) {
-                const int row = place[b * KEPT + q];
-                if (row < 0) continue;
-                __global REAL *here = stack + (row * width + reach + phi) * PARTS * terms + first;
-                __global REAL *mirror = stack + ((rows - 1 - row) * width + reach - phi) * PARTS * terms + first;
-                if (phi <= phi_max) store_terms(mean * f[q][0], mean * f[q][1], lit, terms, here);
-                if (phi > 0 && phi <= reach) store_terms(mean * f[q][0], -mean * f[q][1], lit, terms, mirror);
+    ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0))
+        ROLLED for (int g = 0; g < GROUPS; ++g) {
+            const int begin = first + g * WIDTH, lit = terms - begin;
+            __global const VECTOR *sample = narrow + ((long)phi * tall * GROUPS + g) * PARTS;
+            ROLLED for (int j = 0; j < n3; ++j) {
+                __global const VECTOR *next = sample + PARTS * GROUPS * (j + 1) * points;
+                ROLLED for (int i = 0; i < PARTS * points; ++i) PREFETCH(next + GROUPS * i);
+                first_levels(sample + PARTS * GROUPS * j * points, PARTS * GROUPS, PARTS, factors, turn, axis, own,
+                             b + PARTS * j);
+            }
+            ROLLED for (int t = 0; t < axis.tiles; ++t) {
+                const int k = of[t];
+                fold_complex(b + PARTS * k * axis.stride, PARTS, last_turn + 2 * k * n3, axis.last, folded);
+                ROLLED for (int block = 0; block < axis.last.sets * axis.last.blocks; ++block) {
+                    const int set = block / axis.last.blocks;
+                    VECTOR f[K_PAIRS][2][PARTS];
+                    sum_complex(folded + 2 * PARTS * axis.last.entries * set, last + block * each, axis.last.entries,
+                                f);
+                    __global const int *to_rows = place + (t * axis.last.sets * axis.last.blocks + block) * K_PAIRS * 2;
+                    ROLLED for (int i = 0; i < 2 * K_PAIRS; ++i) {
+                        const int row = to_rows[i];
+                        if (row < 0) continue;
+                        const VECTOR re = mean * f[i / 2][i % 2][0], im = mean * f[i / 2][i % 2][1];
+                        /* small phi is stored at -phi, too */
+                        ROLLED for (int side = phi > phi_max; side < (phi > 0 && phi <= reach ? 2 : 1); ++side) {
+                            const long at = side ? (rows - 1 - row) * width + reach - phi : row * width + reach + phi;
+                            store_terms(re, side ? -im : im, lit, terms, stack + at * PARTS * terms + begin);
+                        }
+                    }
+                }
             }
         }
-    }
 }

@@ -50,8 +50,8 @@
  *   fy_max    double                                 1/um  and along y
  *   spectrum  float[HALVES * tiles][radii][s_nodes][LANES]   1   result: as above
  *
- * Set by the host: LANES, 16; USUAL_TAPS, the width of a window whose loop along x is written out; MOST_BLOCKS and
- * MOST_TAPS, which bound what a work-item keeps.
+ * Set by the host: LANES, 16; USUAL_TAPS, the width of a window whose loop along x is written out; NODES in s that are
+ * summed at a time; MOST_BLOCKS and MOST_TAPS, which bound what a work-item keeps.
  */
 
 #include "common.cl"
@@ -186,31 +186,38 @@ static APART void gather_tile(__global const float *stack, const int columns, co
     ROLLED for (int block = 0; block < PARTS * blocks; ++block) transpose(f_n + LANES * block);
 }
 
-/* E at one node in s from F_n, re and im [terms][azimuths]; `opposite` takes those of the opposite azimuths. */
-static INLINE void power_at_node(const float16 *re, const float16 *im, const int16 turned, const int terms,
-                                 const int s_nodes, __global const float *series, __global float *here,
-                                 __global float *opposite) {
-    float16 even_re = 0.0f, even_im = 0.0f, odd_re = 0.0f, odd_im = 0.0f;
-    ROLLED for (int n = 0; n < terms; n += 2) {
-        const float16 even = series[n * s_nodes], odd = series[(n + 1) * s_nodes];
-        even_re = fma(even, re[n], even_re);
-        even_im = fma(even, im[n], even_im);
-        odd_re = fma(odd, re[n + 1], odd_re);
-        odd_im = fma(odd, im[n + 1], odd_im);
+/* E at `nodes` nodes in s from F_n, re and im [terms][azimuths]; `opposite` takes those of the opposite azimuths. */
+static INLINE void power_of_nodes(const float16 *re, const float16 *im, const int16 turned, const int terms,
+                                  const int nodes, const int s_nodes, __global const float *series,
+                                  __global float *here, __global float *opposite) {
+    float16 even_re[NODES], even_im[NODES], odd_re[NODES], odd_im[NODES];
+    UNROLL for (int j = 0; j < nodes; ++j) even_re[j] = even_im[j] = odd_re[j] = odd_im[j] = 0.0f;
+    ROLLED for (int n = 0; n < terms; n += 2)
+        UNROLL for (int j = 0; j < nodes; ++j) {
+            const float16 even = series[n * s_nodes + j], odd = series[(n + 1) * s_nodes + j];
+            even_re[j] = fma(even, re[n], even_re[j]);
+            even_im[j] = fma(even, im[n], even_im[j]);
+            odd_re[j] = fma(odd, re[n + 1], odd_re[j]);
+            odd_im[j] = fma(odd, im[n + 1], odd_im[j]);
+        }
+    UNROLL for (int j = 0; j < nodes; ++j) {
+        const float16 plus_re = even_re[j] - odd_im[j], plus_im = even_im[j] + odd_re[j];
+        const float16 minus_re = even_re[j] + odd_im[j], minus_im = even_im[j] - odd_re[j];
+        const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
+        STORE(select(plus, minus, turned), here + LANES * j);
+        STORE(select(minus, plus, turned), opposite + LANES * j);
     }
-    const float16 plus_re = even_re - odd_im, plus_im = even_im + odd_re;
-    const float16 minus_re = even_re + odd_im, minus_im = even_im - odd_re;
-    const float16 plus = plus_re * plus_re + plus_im * plus_im, minus = minus_re * minus_re + minus_im * minus_im;
-    STORE(select(plus, minus, turned), here);
-    STORE(select(minus, plus, turned), opposite);
 }
 
 /* E of a tile at every node in s. */
 static APART void power_at_nodes(const float16 *re, const float16 *im, const int16 turned, const int terms,
                                  const int s_nodes, __global const float *series, __global float *here,
                                  __global float *opposite) {
-    ROLLED for (int j = 0; j < s_nodes; ++j)
-        power_at_node(re, im, turned, terms, s_nodes, series + j, here + LANES * j, opposite + LANES * j);
+    int j = 0;
+    ROLLED for (; j + NODES <= s_nodes; j += NODES)
+        power_of_nodes(re, im, turned, terms, NODES, s_nodes, series + j, here + LANES * j, opposite + LANES * j);
+    ROLLED for (; j < s_nodes; ++j)
+        power_of_nodes(re, im, turned, terms, 1, s_nodes, series + j, here + LANES * j, opposite + LANES * j);
 }
 
 __kernel void polar_power_spectrum(__global const float *stack, __global const float *decay, const Grid grid,

@@ -61,7 +61,8 @@
  *   table          float[rings][CHANNELS][w_terms][HALVES * tiles][LANES]   1   result
  *
  * Set by the host: LANES, 16, azimuths of a tile; ORDER (even); MOST_RINGS of a group; MOST_S_NODES and MOST_W_TERMS,
- * which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in registers.
+ * which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in registers; XYZ_HALVES (1 or
+ * 2), tiles of azimuths whose X, Y and Z do.
  */
 
 #include "common.cl"
@@ -250,24 +251,26 @@ static APART void evaluate_g(const Group group, const int from, const int to, __
     }
 }
 
-/* Accumulate X, Y and Z of one ring over `points` points, at node m of w and for both halves:
+/* Accumulate X, Y and Z of one ring over `points` points, at node m of w, for both halves, XYZ_HALVES at a time:
  *   xyz[c][m][h] += sum_p point_weights[p][c][m] g[p][m][h]     c channel, h half */
 static APART void accumulate_xyz(const float16 (*g)[HALVES], const int points, const int m, const int w_terms,
                                  __global const float *point_weights, float16 (*xyz)[HALVES]) {
-    /* a copy stays in registers */
-    float16 sum[CHANNELS][HALVES];
-    UNROLL for (int c = 0; c < CHANNELS; ++c)
-        UNROLL for (int h = 0; h < HALVES; ++h) sum[c][h] = xyz[c * w_terms + m][h];
-    ROLLED for (int p = 0; p < points; ++p) {
-        const float16 a = g[p * w_terms + m][0], b = g[p * w_terms + m][1];
-        UNROLL for (int c = 0; c < CHANNELS; ++c) {
-            const float16 weight = point_weights[(p * CHANNELS + c) * w_terms + m];
-            sum[c][0] = fma(weight, a, sum[c][0]);
-            sum[c][1] = fma(weight, b, sum[c][1]);
-        }
+    ROLLED for (int first = 0; first < HALVES; first += XYZ_HALVES) {
+        /* a copy stays in registers */
+        float16 sum[CHANNELS][XYZ_HALVES];
+        UNROLL for (int c = 0; c < CHANNELS; ++c)
+            UNROLL for (int h = 0; h < XYZ_HALVES; ++h) sum[c][h] = xyz[c * w_terms + m][first + h];
+        ROLLED for (int p = 0; p < points; ++p)
+            UNROLL for (int h = 0; h < XYZ_HALVES; ++h) {
+                const float16 here = g[p * w_terms + m][first + h];
+                UNROLL for (int c = 0; c < CHANNELS; ++c) {
+                    const float16 weight = point_weights[(p * CHANNELS + c) * w_terms + m];
+                    sum[c][h] = fma(weight, here, sum[c][h]);
+                }
+            }
+        UNROLL for (int c = 0; c < CHANNELS; ++c)
+            UNROLL for (int h = 0; h < XYZ_HALVES; ++h) xyz[c * w_terms + m][first + h] = sum[c][h];
     }
-    UNROLL for (int c = 0; c < CHANNELS; ++c)
-        UNROLL for (int h = 0; h < HALVES; ++h) xyz[c * w_terms + m][h] = sum[c][h];
 }
 
 /* A ring's Chebyshev terms over its own w, from X, Y, Z at its group's nodes. */

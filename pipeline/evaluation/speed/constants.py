@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from kernels.blocks import OTHERS
 from kernels.device import default_device
 from pipeline.evaluation.speed import polar_bake
 from pipeline.evaluation.speed.setting import Setting
@@ -10,10 +9,11 @@ from pipeline.progress import Progress, silent
 
 # by the constant's name, the kernels that it is for
 _KERNELS = {
-    "STEP": ("along_x",),
-    "KEPT": ("along_x", "along_y"),
+    "K_PAIRS": ("along_x", "along_y"),
     "USUAL_TAPS": ("polar_power_spectrum",),
+    "NODES": ("polar_power_spectrum",),
     "W_BLOCK": ("apply_operator",),
+    "XYZ_HALVES": ("apply_operator",),
 }
 
 
@@ -35,7 +35,7 @@ def measure(setting: Setting, repeats: int, progress: Progress = silent) -> list
     """
     blocks, found = default_device().blocks, []
     for done, (name, kernels) in enumerate(_KERNELS.items(), 1):
-        value, other = blocks.chosen(name)[name], OTHERS[name]
+        value, other = blocks.chosen(name)[name], blocks.others[name]
         with blocks.instead(**{name: other}):
             other_s = _seconds(setting, repeats, kernels)
         found.append(Constant(name, value, _seconds(setting, repeats, kernels), other, other_s))

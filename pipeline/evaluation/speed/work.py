@@ -26,12 +26,17 @@ def taps(built: Stack) -> int:
 
 
 def stack(field: HeightField, built: Stack) -> Work:
-    """Count a transform of a real field for every term: along x for every row, along y for the columns kept."""
+    """Count terms, and transforms pruned to the frequencies kept: along x of every row, along y of the columns kept.
+
+    An FFT of n samples of which k frequencies are wanted takes 5 n log2 k operations, half of them for real samples.
+    The rows' transforms are written and read once more: they are larger than caches.
+    """
     ny, nx = field.shape
-    columns = built.coefficients.shape[1] - built.column_zero
-    flops = built.terms * (2.5 * ny * nx * log2(nx) + 5.0 * columns * ny * log2(ny))
+    rows, columns = built.coefficients.shape[0], built.coefficients.shape[1] - built.column_zero
+    flops = built.terms * (2.0 * ny * nx + 2.5 * ny * nx * log2(2 * columns) + 5.0 * columns * ny * log2(rows))
     precision: Precision = "single" if built.coefficients.itemsize == 4 else "double"
-    return Work("stack", precision, flops, field.heights_um.nbytes + _nbytes(built))
+    between = 2.0 * 2 * built.coefficients.itemsize * built.terms * columns * ny
+    return Work("stack", precision, flops, field.heights_um.nbytes + between + _nbytes(built))
 
 
 def _nbytes(built: Stack) -> float:
