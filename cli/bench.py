@@ -162,6 +162,8 @@ def _print_speed(found: "SpeedResults") -> None:
         f"{machine.device}, {machine.compute_units} compute units: {machine.single_flops / 1e9:.0f} GFLOP/s single, "
         f"{machine.double_flops / 1e9:.0f} double, {machine.bandwidth / 1e9:.1f} GB/s, measured in this run"
     )
+    blocks = ", ".join(f"{name} {value}" for name, value in machine.blocks.items())
+    console.say(f"vectors of {machine.vector_width} floats; the kernels' blocks for them: {blocks}")
     for surface in found.surfaces:
         _print_surface(surface, found)
     if found.constants:

@@ -39,8 +39,8 @@ class Blocks:
         return min(64, max(2 * itemsize, 4 * self.vector_width)) // itemsize
 
     def chosen(self, *names: str) -> dict[str, int]:
-        """Return the values of some constants, by their names in the kernels."""
-        return {name: self._values[name] for name in names}
+        """Return the values of some constants, by their names in the kernels; of all where none is named."""
+        return {name: self._values[name] for name in names or self._values}
 
     @contextmanager
     def instead(self, **constants: int) -> Iterator[None]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels import device, dft_stack
+from kernels import device, dft_stack, factored_axis
 from kernels.dft_stack import Kept
 from pipeline.fourier import term_transforms
 
@@ -69,13 +69,22 @@ def test_transforms_equal_explicit_sums(algorithm, ny, nx, dtype, tolerance, ser
     assert np.max(np.abs(found - sums(heights, SCALE_PER_UM, series, kept, terms))) < tolerance
 
 
-@pytest.mark.parametrize(("ny", "nx"), [(360, 288), (257, 331), (243, 500)], ids=lambda n: str(n))
+@pytest.mark.parametrize(
+    ("ny", "nx"), [(360, 288), (257, 331), (243, 500), (8100, 5), (3, 8192)], ids=lambda n: str(n)
+)
 @PRECISIONS
 def test_the_kernel_and_fftw_agree(ny, nx, dtype, tolerance):
-    """At sizes for which sums take long: composite, prime, even and odd; a part of the frequencies is kept."""
+    """At sizes for which sums take long: composite, prime, even and odd, long; a part of the frequencies is kept."""
     of = heights_of(ny, nx), SCALE_PER_UM, "chebyshev", Kept(psi_max=ny // 5, phi_max=nx // 6, reach=4), 33, dtype
     difference = by_kernel(*of) - by_fftw(*of)
     assert np.max(np.abs(difference)) < tolerance
+
+
+@pytest.mark.parametrize("width", [4, 8, 16])
+def test_vectors_of_any_processor_hold_the_terms(monkeypatch, width):
+    """Two to eight doubles of a register."""
+    monkeypatch.setattr(device.default_device().blocks, "vector_width", width)
+    test_transforms_equal_explicit_sums(by_kernel, 24, 30, np.float64, 1e-14, "chebyshev")
 
 
 def test_two_hundred_terms_are_as_accurate_as_few():
@@ -87,6 +96,15 @@ def test_two_hundred_terms_are_as_accurate_as_few():
     assert np.max(np.abs(found - sums(heights, 1.0, "chebyshev", kept, 200))) < 1e-12
     assert reports == sorted(reports)
     assert reports[-1] == 1.0
+
+
+@pytest.mark.parametrize(("samples", "most"), [(1332, 60), (8192, 70), (8100, 75)])
+def test_operations_a_sample_hardly_grow_with_samples(samples, most):
+    """Multiply-adds of complex samples, two for each factor, where a quarter of the frequencies is kept."""
+    first, second, last = factored_axis.of_complex(samples, samples // 4, 3).levels
+    of = [2 * level.factors().size / level.points for level in (first, second, last)]
+    assert first.points * second.points * last.points == samples
+    assert sum(of) < most
 
 
 @pytest.mark.parametrize("cores", [1, 3, 64, None])

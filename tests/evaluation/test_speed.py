@@ -139,7 +139,7 @@ def test_the_power_spectrum_needs_what_its_loops_do() -> None:
 
 
 def test_a_share_is_of_what_binds() -> None:
-    limits = Machine("device", 2, single_flops=100.0, double_flops=50.0, bandwidth=10.0)
+    limits = Machine("device", 2, 16, {}, single_flops=100.0, double_flops=50.0, bandwidth=10.0)
     reached = machine.share(Timed(Work("x", "single", flops=100.0, bytes=5.0), 2.0), limits)
     assert (reached.peak_share, reached.bandwidth_share) == (0.5, 0.25)
     assert (reached.bound, reached.bound_share) == ("arithmetic", 0.5)

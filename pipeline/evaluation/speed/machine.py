@@ -10,10 +10,15 @@ Precision = Literal["single", "double"]
 
 @dataclass(frozen=True)
 class Machine:
-    """The device, its FMA peaks in operations a second and its memory bandwidth in bytes a second."""
+    """The device, its FMA peaks in operations a second and its memory bandwidth in bytes a second.
+
+    vector_width: floats of a register. blocks: the kernels' constants chosen for it.
+    """
 
     device: str
     compute_units: int
+    vector_width: int
+    blocks: dict[str, int]
     single_flops: float
     double_flops: float
     bandwidth: float
@@ -23,7 +28,8 @@ def measure() -> Machine:
     """Measure peaks and bandwidth of the default device."""
     used = device.default_device()
     peaks = peak.measure_peak("single"), peak.measure_peak("double")
-    return Machine(used.name, used.compute_units, *peaks, peak.measure_bandwidth())
+    chosen = used.blocks.chosen()
+    return Machine(used.name, used.compute_units, used.vector_width, chosen, *peaks, peak.measure_bandwidth())
 
 
 def best(first: Machine, second: Machine) -> Machine:
