@@ -47,6 +47,8 @@ _STRAIGHT = 1e-3
 _CLIPPED = 0.02
 # repeats of the last line, and how much more often than any other line is repeated
 _LEAST_REPEATS, _MORE_REPEATS, _OTHER_REPEATS = 3, 4, 0.05
+# distance from all others, in ranges, of an extreme value that is told
+_DOUBTFUL = 0.1
 # populations of heights: least share of the smaller, distance in um and in ranges of the wider
 _POPULATION, _CLIFF_UM, _CLIFF = 0.005, 2.0, 5.0
 
@@ -103,6 +105,7 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
     heights = scan.heights.copy()
     hole = np.isnan(heights)
     found: list[Unmeasured] = []
+    doubts: list[str] = []
 
     def add(kind: str, stated: bool, new: Mask, value: float | None = None) -> None:
         new &= ~hole
@@ -135,6 +138,7 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
         if plateau is not None:
             value, tolerance = plateau
             add("one value among heights", False, np.abs(heights - value) <= tolerance, value)
+        doubts = _doubtful_extremes(heights[~hole])
     box, cropped = _box(hole)
     masked_share = 0.0 if scan.mask is None else float(np.mean(scan.mask))
     kept = np.ascontiguousarray(heights[box])
@@ -143,6 +147,7 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
     warnings = (
         *_mask_warnings(masked_share, mask),
         *_hole_warnings(tuple(found), share, cropped, holes / kept.size),
+        *doubts,
     )
     return Measured(kept, tuple(found), share, cropped, holes, masked_share, warnings)
 
@@ -209,6 +214,29 @@ def _is_no_data(known: Array, value: float, between: Array, is_image: bool) -> b
     # differences by rounding make no different values
     steps = np.unique(np.round((_sample(between) - value) / gap, 6))
     return spread > 0 and gap >= _APART * spread and steps.size >= _LEAST_VALUES
+
+
+def _doubtful_extremes(known: Array) -> list[str]:
+    """Tells of a lowest or highest value that many samples hold, too close to the others to be taken for no data.
+
+    Clipped heights end at the others, and the levels of a grating have few values between them.
+    """
+    few = np.sort(_sample(known))
+    levels, counts = np.unique(few, return_counts=True)
+    if levels.size < _LEAST_VALUES:
+        return []
+    doubts = []
+    for end, beside in ((0, 1), (-1, -2)):
+        gap = abs(float(levels[beside] - levels[end]))
+        inner = np.diff(levels[1:-1])
+        held = counts[end] / few.size
+        if _PLATEAU_SHARE < held <= _LARGEST_SHARE and gap > max(_DOUBTFUL * _range(few), inner.max()):
+            value = f"{levels[end]:.6g}"
+            doubts.append(
+                f"{100 * held:.2g} % of the samples hold one value, {value}, apart from all others: if they were not "
+                f"measured, set surface.no_data = [{value}]"
+            )
+    return doubts
 
 
 def _plateau(known: Array) -> tuple[float, float] | None:

@@ -113,6 +113,17 @@ def test_named_numbers_and_no_others() -> None:
     assert measured.warnings == ()
 
 
+@pytest.mark.parametrize("below", [True, False])
+def test_an_extreme_value_too_close_to_the_others_is_told(below: bool) -> None:
+    heights = skin()
+    level = heights.min() - 0.2 * np.ptp(heights) if below else heights.max() + 0.2 * np.ptp(heights)
+    heights[20:30, 20:30] = level
+    measured = measured_part(scan(heights))
+    assert measured.unmeasured == ()
+    assert f"hold one value, {level:.6g}, apart from all others" in measured.warnings[0]
+    assert measured_part(scan(heights), no_data=()).warnings == ()
+
+
 # --- rows --------------------------------------------------------------------------------------------
 
 

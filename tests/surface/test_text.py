@@ -438,6 +438,29 @@ def test_points_far_from_a_grid_are_refused(tmp_path: Path, noise: float, said: 
         read_scan(tmp_path / "a.xyz", None)
 
 
+# --- numbers -----------------------------------------------------------------------------------------
+
+
+def test_thousands_that_look_like_decimals(tmp_path: Path) -> None:
+    rows = [[f"{value:,.0f}" for value in row] for row in TOP_FIRST * 60]
+    said = message_of(save(tmp_path, "\n".join("\t".join(row) for row in rows)))
+    assert "beside integers such as" in said
+    # decimals that happen to have three digits
+    rows = [[f"{value:.3f}".replace(".", ",") for value in row] for row in TOP_FIRST]
+    scan = read_scan(save(tmp_path, "\n".join("\t".join(row) for row in rows)), None)
+    np.testing.assert_allclose(scan.heights, TOP_FIRST[::-1], atol=1e-3)
+
+
+def test_the_sign_of_mathematics(tmp_path: Path) -> None:
+    scan = read_scan(save(tmp_path, body(TOP_FIRST).replace("-", "\u2212")), None)
+    np.testing.assert_allclose(scan.heights, TOP_FIRST[::-1], atol=1e-4)
+
+
+def test_a_factor_of_spip_for_another_quantity(tmp_path: Path) -> None:
+    header = "# File Format = ASCII\n# x-length = 1000\n# y-length = 500\n# Bit2nm = 1.0\n# z-unit = V\n"
+    assert "found values in 'V'" in message_of(save(tmp_path, header + body(TOP_FIRST), "scan.asc"))
+
+
 # --- Keyence -----------------------------------------------------------------------------------------
 
 

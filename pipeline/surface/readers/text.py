@@ -29,6 +29,7 @@ _VOID = re.compile(
     r"|[-+]?nan(?:\(\w*\))?|-?1\.#\w+|bad|void|null|none|nil|masked|invalid|n/?a|#n/?a|#\w+[!?/]\w*!?|-+|–|—|\*+|\?+|_+",
     re.IGNORECASE,
 )
+_GROUPED = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
 _INFINITY = re.compile(r"[-+]?inf(?:inity)?", re.IGNORECASE)
 _COMMENT = ("#", "%", "//", "!")
 _REMOVE = "remove that line, or begin it with '#'"
@@ -129,7 +130,8 @@ def utf16_without_mark(head: bytes) -> str | None:
 
 def _split(path: Path, content: str) -> _Content:
     """Separates the header from the rows of numbers. Raises InputError for a line that is neither."""
-    lines = keyence.translated(path.name, content.splitlines())
+    # typographic programs write the sign of mathematics
+    lines = keyence.translated(path.name, content.replace("\u2212", "-").splitlines())
     separator, decimal_comma = _separator(path, lines)
     usual = _typical_row(lines).count("\t")
     found = _Content([], [], [], [], separator, decimal_comma)
@@ -272,12 +274,32 @@ def _table(path: Path, content: _Content) -> NDArray[np.float64]:
         row if _is_plain(row) and not _has_empty_cell(row, separator) else _with_nan(row, separator) for row in rows
     ]
     if content.decimal_comma:
+        _refuse_thousands(path, rows, separator)
         rows = [row.replace(",", ".") for row in rows]
     try:
         table = np.loadtxt(rows, dtype=np.float64, delimiter=separator, comments=None, ndmin=2)
     except ValueError as error:
         raise _uneven(path, content, rows, str(error)) from None
     return table
+
+
+def _refuse_thousands(path: Path, rows: list[str], separator: str | None) -> None:
+    """Refuses integers with commas between thousands, which would be taken for decimal points.
+
+    Decimals are printed with equally many digits; here all numbers without a comma are integers below 1000.
+    """
+    with_comma = re.search(_GROUPED, next((row for row in rows if "," in row), ""))
+    if with_comma is None:
+        return
+    looked_at = rows[:: len(rows) // 200 + 1]
+    cells = [cell.lstrip("+-") for row in looked_at for cell in _cells(row, separator) if not _VOID.fullmatch(cell)]
+    plain = [cell for cell in cells if "," not in cell]
+    others = [cell for cell in cells if "," in cell]
+    if not plain or not all(cell.isdecimal() and len(cell) <= 3 for cell in plain):
+        return
+    if others and all(_GROUPED.fullmatch(cell) for cell in others):
+        found = f"{with_comma[0]!r} beside integers such as {plain[0]!r}, which may be thousands or decimals"
+        raise fault(path.name, "numbers", found, "export them without separators of thousands")
 
 
 def _without_outer_separators(rows: list[str], separator: str) -> list[str]:
