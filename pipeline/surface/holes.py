@@ -406,7 +406,14 @@ def _repeated_lines(heights: Array, hole: Mask) -> Mask:
 
 
 def _are_equal(heights: Array, pairs: list[tuple[int, int]]) -> list[bool]:
-    return [np.array_equal(heights[a], heights[b], equal_nan=True) for a, b in pairs]
+    """Says of pairs of rows whether they are equal, up to the constant that subtracting a plane leaves."""
+    found = []
+    for a, b in pairs:
+        apart = heights[a] - heights[b]
+        known = ~np.isnan(apart)
+        same = bool(known.any()) and np.array_equal(np.isnan(heights[a]), np.isnan(heights[b]))
+        found.append(same and float(np.ptp(apart[known])) <= _ROUNDING * float(np.ptp(heights[a][known])))
+    return found
 
 
 def _adjacent(rows: NDArray[np.intp]) -> list[tuple[int, int]]:

@@ -179,6 +179,15 @@ def test_repeats_of_the_last_line_are_cropped(repeats: int, bottom: bool) -> Non
     np.testing.assert_array_equal(measured.heights, heights[repeats:] if bottom else heights[:-repeats])
 
 
+@pytest.mark.parametrize("slope", [(0.3, 0.0), (0.3, -0.7)])
+def test_repeats_from_which_a_plane_was_subtracted(slope: tuple[float, float]) -> None:
+    heights = skin()
+    heights[40:] = heights[39]
+    heights -= slope[0] * np.arange(NX) + slope[1] * np.arange(NY)[:, None]
+    assert found(measured_part(scan(heights))) == ["repeated rows"]
+    assert measured_part(scan(heights)).cropped == (0, NY - 40, 0, 0)
+
+
 def test_a_lost_line_within_the_scan_is_filled() -> None:
     heights = skin()
     heights[30] = 0.0
