@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.surface.no_data import Mask, doubtful_extremes, numbers, plateau, sample, spread
 from pipeline.surface.scan import Scan
-from pipeline.surface.unscanned import constant_lines, repeated_lines, straight_lines
+from pipeline.surface.unscanned import constant_lines, repeated_lines, smooth_edge, straight_lines
 
 MaskUse = Literal["holes", "ignore", "keep"]
 Box = tuple[slice, slice]
@@ -108,7 +108,7 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
         if (found_one := plateau(heights[~hole])) is not None:
             value, tolerance = found_one
             add("one value among heights", False, np.abs(heights - value) <= tolerance, value)
-        doubts = doubtful_extremes(heights[~hole])
+        doubts = [*doubtful_extremes(heights[~hole]), *_smooth_warnings(heights)]
     box, cropped = _box(hole)
     masked_share = 0.0 if scan.mask is None else float(np.mean(scan.mask))
     kept = np.ascontiguousarray(heights[box])
@@ -153,6 +153,13 @@ def _box(hole: Mask) -> tuple[Box, tuple[int, int, int, int]]:
     bottom, top, left, right = (int(n) for n in (rows[0], rows[-1], columns[0], columns[-1]))
     ny, nx = hole.shape
     return (slice(bottom, top + 1), slice(left, right + 1)), (bottom, ny - 1 - top, left, nx - 1 - right)
+
+
+def _smooth_warnings(heights: Array) -> list[str]:
+    count = smooth_edge(heights)
+    if not count:
+        return []
+    return [f"{count} rows at an edge are far smoother than all others: if the tip was lifted there, crop them"]
 
 
 def _mask_warnings(share: float, use: MaskUse | None) -> list[str]:

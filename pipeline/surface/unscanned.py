@@ -16,6 +16,8 @@ _VERY_ROUGH = 0.8
 _LEAST_ROWS = 8
 # bends of a straight row, in those of typical samples: what is left is rounding
 _STRAIGHT = 1e-3
+# mean bends of rows of a lifted tip, in those of the roughest row; the least of all other rows
+_SMOOTH, _EVENLY = 0.02, 0.3
 # a value this close to the end of the others' range, in shares of it, is where they are clipped, and rows of it are
 # not measured only in one block at an edge
 _CLIPPED = 0.02
@@ -113,6 +115,28 @@ def straight_lines(heights: Array) -> Mask:
         if others.size >= _LEAST_ROWS and np.count_nonzero(rough <= _STRAIGHT * bend) <= _RARE * rough.size:
             new[inwards[:count]] = True
     return new
+
+
+def smooth_edge(heights: Array) -> int:
+    """Counts the rows of a block at an edge that is far smoother than all other rows, as rows of a lifted tip are."""
+    # row by row: the bends of all would take as much memory as the scan
+    means = [_mean_bend(row) for row in heights]
+    bends = np.array([mean for mean in means if mean is not None])
+    if bends.size < 2 * _LEAST_ROWS:
+        return 0
+    for inwards in (bends, bends[::-1]):
+        smooth = inwards <= _SMOOTH * float(inwards.max())
+        count = int(np.argmin(smooth)) if not smooth.all() else 0
+        rest = inwards[count:]
+        if count >= _LEAST_ROWS and rest.size >= _LEAST_ROWS and rest.min() > _EVENLY * rest.max():
+            return count
+    return 0
+
+
+def _mean_bend(row: Array) -> float | None:
+    bends = _bends(row[None])
+    known = ~np.isnan(bends)
+    return float(bends[known].mean()) if known.any() else None
 
 
 def _bends(rows: Array) -> Array:

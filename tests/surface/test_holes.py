@@ -188,6 +188,15 @@ def test_repeats_from_which_a_plane_was_subtracted(slope: tuple[float, float]) -
     assert measured_part(scan(heights)).cropped == (0, NY - 40, 0, 0)
 
 
+def test_rows_of_a_lifted_tip_are_told() -> None:
+    heights = skin()
+    heights[50:] = 0.01 * np.random.default_rng(2).standard_normal((NY - 50, NX))
+    measured = measured_part(scan(heights))
+    assert measured.unmeasured == ()
+    assert measured.warnings[0].startswith(f"{NY - 50} rows at an edge are far smoother")
+    assert measured_part(scan(heights), no_data=()).warnings == ()
+
+
 def test_a_lost_line_within_the_scan_is_filled() -> None:
     heights = skin()
     heights[30] = 0.0
