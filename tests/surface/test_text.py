@@ -496,3 +496,35 @@ def test_keyence(tmp_path: Path, separator: str, words: tuple[str, ...], channel
 def test_keyence_without_heights(tmp_path: Path) -> None:
     content = _keyence(",", _ENGLISH, "Laser")
     assert "expected heights in a Keyence .csv, found 'Laser'" in message_of(save(tmp_path, content, "scan.csv"))
+
+
+# --- what was not measured, in text ------------------------------------------------------------------
+
+
+def _noisy() -> NDArray[np.float64]:
+    y, x = np.mgrid[:64, :64]
+    return np.asarray(np.round(30 * np.sin(x / 5) + np.random.default_rng(3).normal(0, 5, y.shape), 3), np.float64)
+
+
+_HIGH = _noisy() > 20
+# what a program wrote into a part of the scan -> holes, cropped (bottom, top, left, right), and words of a warning
+_WRITTEN: dict[str, tuple[tuple[Any, ...], float, int, tuple[int, int, int, int], str]] = {
+    "a number of convention": ((_HIGH,), -10000, 1065, (0, 0, 0, 0), "no-data number"),
+    "the largest float": ((slice(0, 10),), 1.70141e38, 0, (0, 10, 0, 0), "no-data number"),
+    "a number five ranges away": ((slice(20, 40), slice(20, 40)), -500, 400, (0, 0, 0, 0), "no-data number"),
+    "zero among the heights": ((slice(20, 40), slice(20, 40)), 0, 400, (0, 0, 0, 0), "one value among heights"),
+    "columns of zero": ((slice(None), slice(50, 64)), 0, 0, (0, 0, 0, 14), "columns of one value"),
+    "a number below all heights": ((slice(20, 40), slice(20, 40)), -60, 0, (0, 0, 0, 0), "apart from all others"),
+}
+
+
+@pytest.mark.parametrize("name", _WRITTEN)
+def test_numbers_that_programs_write_for_no_data(tmp_path: Path, name: str) -> None:
+    place, number, holes, cropped, said = _WRITTEN[name]
+    heights = _noisy()
+    heights[place] = number
+    path = tmp_path / "scan.txt"
+    np.savetxt(path, heights, fmt="%.6g", delimiter="\t")
+    _, record = load_scan(SurfaceSource(path=str(path), pitch_um=0.1, height_unit="nm"))
+    assert (record.holes, record.cropped) == (holes, cropped)
+    assert said in record.warnings[0]
