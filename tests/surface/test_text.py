@@ -461,6 +461,38 @@ def test_a_factor_of_spip_for_another_quantity(tmp_path: Path) -> None:
     assert "found values in 'V'" in message_of(save(tmp_path, header + body(TOP_FIRST), "scan.asc"))
 
 
+@pytest.mark.parametrize("place", ["first column", "last column", "first row", "last row"])
+def test_an_axis_is_no_height(tmp_path: Path, place: str) -> None:
+    side, line = place.split()
+    axis = 0.1 * np.arange(TOP_FIRST.shape[0 if line == "column" else 1])
+    order = (axis, TOP_FIRST.T if line == "column" else TOP_FIRST)
+    table = np.vstack(order if side == "first" else order[::-1])
+    table = table.T if line == "column" else table
+    said = message_of(save(tmp_path, body(table)))
+    assert f"found a {place} that goes evenly from 0 to" in said
+    # a tilted mirror with dust is no axis
+    dusty = 0.1 * np.arange(16.0) + 0.2 * np.arange(12.0)[:, None] + (RNG.random((12, 16)) < 0.1)
+    dusty[0], dusty[-1] = dusty[0].min() + 0.1 * np.arange(16), dusty[-1].max() + 0.1 * np.arange(16)
+    read_scan(save(tmp_path, body(dusty)), None)
+
+
+def test_a_second_table(tmp_path: Path) -> None:
+    header = "# Channel: {}\n# Width: 10 um\n# Height: 10 um\n# Value units: {}\n"
+    content = header.format("Height", "nm") + body(TOP_FIRST)
+    message = message_of(save(tmp_path, content + header.format("Phase", "deg") + body(TOP_FIRST)))
+    assert "another header in line 17" in message
+    read_scan(save(tmp_path, content + "# Channel: end of it\n"), None)
+
+
+@pytest.mark.parametrize("name", ["Phase", "Deflection", "Amplitude error"])
+def test_a_text_of_another_quantity_is_not_taken_unasked(tmp_path: Path, name: str) -> None:
+    path = save(
+        tmp_path, f"# Channel: {name}\n# Width: 10 um\n# Height: 10 um\n# Value units: nm\n" + body(TOP_FIRST)
+    )
+    assert f"found only '{name}'" in message_of(path)
+    assert read_scan(path, name).channel == name
+
+
 # --- Keyence -----------------------------------------------------------------------------------------
 
 
