@@ -233,7 +233,7 @@ def _units(
 
 def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Origin] | None:
     if scan.full_code is not None:
-        return _unit_of_image(file, scan.full_code, surface)
+        return _unit_of_image(file, scan.full_code, scan.um_per_unit, surface)
     if surface.height_range_um is not None:
         found = "surface.height_range_um, which is for 8- and 16-bit images"
         raise fault(file, "heights with a unit", found, "use surface.height_unit instead")
@@ -248,13 +248,21 @@ def _unit(file: str, scan: Scan, surface: SurfaceSource) -> tuple[float, Origin]
     raise fault(file, "units that agree", f"{found} ({configured:g} um)", _OVERRIDE)
 
 
-def _unit_of_image(file: str, full_code: float, surface: SurfaceSource) -> tuple[float, Origin] | None:
+def _unit_of_image(
+    file: str, full_code: float, stated: float | None, surface: SurfaceSource
+) -> tuple[float, Origin] | None:
     if surface.height_unit is not None:
         found = f"surface.height_unit = '{surface.height_unit}', but an image holds codes 0..{full_code:g}"
         raise fault(file, "a height range", found, "set surface.height_range_um instead")
     if surface.height_range_um is None:
-        return None
-    return surface.height_range_um / full_code, "config"
+        return None if stated is None else (stated, "file")
+    configured = surface.height_range_um / full_code
+    if stated is None or surface.override_file_units:
+        return configured, "config"
+    if _agree(configured, stated):
+        return stated, "file"
+    found = f"{stated * full_code:.6g} um in the file, but surface.height_range_um = {surface.height_range_um:g}"
+    raise fault(file, "height ranges that agree", found, _OVERRIDE)
 
 
 def _pitch(file: str, scan: Scan, surface: SurfaceSource) -> tuple[tuple[float, float], Origin] | None:

@@ -113,6 +113,17 @@ def test_named_numbers_and_no_others() -> None:
     assert measured.warnings == ()
 
 
+@pytest.mark.parametrize("below", [True, False])
+def test_an_extreme_value_too_close_to_the_others_is_told(below: bool) -> None:
+    heights = skin()
+    level = heights.min() - 0.2 * np.ptp(heights) if below else heights.max() + 0.2 * np.ptp(heights)
+    heights[20:30, 20:30] = level
+    measured = measured_part(scan(heights))
+    assert measured.unmeasured == ()
+    assert f"hold one value, {level:.6g}, apart from all others" in measured.warnings[0]
+    assert measured_part(scan(heights), no_data=()).warnings == ()
+
+
 # --- rows --------------------------------------------------------------------------------------------
 
 
@@ -166,6 +177,24 @@ def test_repeats_of_the_last_line_are_cropped(repeats: int, bottom: bool) -> Non
     assert measured.cropped == ((repeats, 0, 0, 0) if bottom else (0, repeats, 0, 0))
     assert found(measured) == ["repeated rows"]
     np.testing.assert_array_equal(measured.heights, heights[repeats:] if bottom else heights[:-repeats])
+
+
+@pytest.mark.parametrize("slope", [(0.3, 0.0), (0.3, -0.7)])
+def test_repeats_from_which_a_plane_was_subtracted(slope: tuple[float, float]) -> None:
+    heights = skin()
+    heights[40:] = heights[39]
+    heights -= slope[0] * np.arange(NX) + slope[1] * np.arange(NY)[:, None]
+    assert found(measured_part(scan(heights))) == ["repeated rows"]
+    assert measured_part(scan(heights)).cropped == (0, NY - 40, 0, 0)
+
+
+def test_rows_of_a_lifted_tip_are_told() -> None:
+    heights = skin()
+    heights[50:] = 0.01 * np.random.default_rng(2).standard_normal((NY - 50, NX))
+    measured = measured_part(scan(heights))
+    assert measured.unmeasured == ()
+    assert measured.warnings[0].startswith(f"{NY - 50} rows at an edge are far smoother")
+    assert measured_part(scan(heights), no_data=()).warnings == ()
 
 
 def test_a_lost_line_within_the_scan_is_filled() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from pipeline.errors import InputError
 from pipeline.surface.load import load_scan
@@ -171,3 +172,49 @@ def test_damaged_tags_raise_no_other_error(tmp_path: Path) -> None:
         path.write_bytes(bytes(data))
         with suppress(InputError):
             read_scan(path, None)
+
+
+# --- units in images ---------------------------------------------------------------------------------
+
+
+def _codes() -> np.ndarray:
+    return np.arange(120, dtype=np.uint16).reshape(10, 12) * 500
+
+
+def _gwyddion_png(path: Path, **others: str) -> Path:
+    """A 16-bit PNG by Gwyddion: ZMin is the height of code 0, ZMax that of the largest code."""
+    texts = PngInfo()
+    entries = {"XReal": "6e-6", "YReal": "2e-6", "ZMin": "-1e-7", "ZMax": "2e-7", "XYUnit": "m", "ZUnit": "m"}
+    for key, text in (entries | others).items():
+        texts.add_text(f"Gwy::{key}", text)
+    Image.fromarray(_codes()).save(path, pnginfo=texts)
+    return path
+
+
+def test_units_of_a_gwyddion_png(tmp_path: Path) -> None:
+    path = _gwyddion_png(tmp_path / "a.png")
+    field, record = load_scan(SurfaceSource(path=str(path)))
+    assert field.pitch_um == pytest.approx((0.5, 0.2))
+    np.testing.assert_allclose(field.heights_um, _codes()[::-1] * 0.3 / 65535)
+    assert (record.pitch_from, record.unit_from) == ("file", "file")
+    for keys in ({"height_range_um": 1.0}, {"pitch_um": 0.5}):
+        with pytest.raises(InputError, match=r"agree, found .* in the file, but surface"):
+            load_scan(SurfaceSource(path=str(path), **keys))
+        load_scan(SurfaceSource(path=str(path), override_file_units=True, **keys))
+
+
+def test_a_gwyddion_png_of_volts_is_no_height_map(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="found values in 'V'"):
+        read_scan(_gwyddion_png(tmp_path / "a.png", ZUnit="V"), None)
+
+
+@pytest.mark.parametrize(
+    ("unit", "pitch"), [("um", 0.05), ("micron", 0.05), ("\\u00B5m", 0.05), ("nm", 5e-5), ("inch", None), ("", None)]
+)
+def test_units_of_an_imagej_tiff(tmp_path: Path, unit: str, pitch: float | None) -> None:
+    tifffile = pytest.importorskip("tifffile")
+    lines = {"unit": unit, "cf": 0, "c0": -3.0, "c1": 0.5, "vunit": "nm"}
+    tifffile.imwrite(tmp_path / "a.tif", _codes(), imagej=True, resolution=(20, 20), metadata=lines)
+    scan = read_scan(tmp_path / "a.tif", None)
+    assert scan.pitch_um == (None if pitch is None else pytest.approx((pitch, pitch)))
+    assert scan.um_per_unit == pytest.approx(0.5e-3)

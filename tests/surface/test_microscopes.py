@@ -11,9 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
+from pipeline.surface.load import load_scan
 from pipeline.surface.readers import read_scan
 from pipeline.surface.readers.common import pick_channel
+from pipeline.surface.source import SurfaceSource
 from tests.support import shared_file
+from tests.surface.test_profilometers import mdt
 
 RNG = np.random.default_rng(5)
 HEADER_BYTES = 8192
@@ -289,3 +292,47 @@ def test_stale_labels_and_deflection_of_the_field() -> None:
     assert read_scan(shared_file("field/asylum_stale_label.ibw"), "HeightTrace").channels[1] == "HeightRetrace"
     with pytest.raises(InputError, match="only 'Deflection'"):
         read_scan(shared_file("field/d_only_deflection.001"), None)
+
+
+# --- Asylum, NT-MDT and Park -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "cropped"), [("zeros", (100, 0)), ("nan", (0, 106)), ("repeats", (0, 106))])
+def test_unscanned_rows_of_an_igor_wave(tmp_path: Path, kind: str, cropped: tuple[int, int]) -> None:
+    data = bytearray(shared_file("scans/spot_1-1000nm.ibw").read_bytes())
+    # layers of 256 x 256 floats behind the headers
+    lines = np.frombuffer(data, "<f4", 8 * 256 * 256, 64 + 320).reshape(8, 256, 256)
+    if kind == "zeros":
+        lines[:, :100] = 0
+    else:
+        lines[:, 150:] = np.nan if kind == "nan" else lines[:, 149:150]
+    (tmp_path / "a.ibw").write_bytes(data)
+    field, record = load_scan(SurfaceSource(path=str(tmp_path / "a.ibw")))
+    assert record.cropped == (*cropped, 0, 0)
+    assert field.shape == (256 - sum(cropped), 256)
+    assert "was not measured" in record.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("code", "um"), [(-3, 1e3), (-2, 1.0), (-1, 1e-3), (0, 1e-4), (-10, None), (1, None), (3, None), (8, None)]
+)
+def test_units_of_an_mdt_frame(tmp_path: Path, code: int, um: float | None) -> None:
+    """Codes of lengths from mm to angstrom; others are charges, voltages, angles and counts."""
+    heights = struct.pack("<ffh", 0, 1, -1)
+    (tmp_path / "a.mdt").write_bytes(mdt().replace(heights, struct.pack("<ffh", 0, 1, code)))
+    if um is None:
+        with pytest.raises(InputError, match="none in a unit of length"):
+            read_scan(tmp_path / "a.mdt", None)
+        return
+    scan = read_scan(tmp_path / "a.mdt", None)
+    assert scan.um_per_unit is not None
+    assert np.ptp(scan.heights) * scan.um_per_unit == pytest.approx(119 * um)
+    assert scan.pitch_um == pytest.approx((0.1, 0.2))
+
+
+def test_an_error_signal_of_park_is_not_taken_unasked(tmp_path: Path) -> None:
+    data = shared_file("scans/example_ps.tiff").read_bytes()
+    name, other = "Z Height".encode("utf-16-le"), "Z Error\0".encode("utf-16-le")
+    (tmp_path / "a.tiff").write_bytes(data.replace(name, other))
+    with pytest.raises(InputError, match=r"only 'Z Error'; choose by surface\.channel"):
+        read_scan(tmp_path / "a.tiff", None)

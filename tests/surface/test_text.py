@@ -438,6 +438,61 @@ def test_points_far_from_a_grid_are_refused(tmp_path: Path, noise: float, said: 
         read_scan(tmp_path / "a.xyz", None)
 
 
+# --- numbers -----------------------------------------------------------------------------------------
+
+
+def test_thousands_that_look_like_decimals(tmp_path: Path) -> None:
+    rows = [[f"{value:,.0f}" for value in row] for row in TOP_FIRST * 60]
+    said = message_of(save(tmp_path, "\n".join("\t".join(row) for row in rows)))
+    assert "beside integers such as" in said
+    # decimals that happen to have three digits
+    rows = [[f"{value:.3f}".replace(".", ",") for value in row] for row in TOP_FIRST]
+    scan = read_scan(save(tmp_path, "\n".join("\t".join(row) for row in rows)), None)
+    np.testing.assert_allclose(scan.heights, TOP_FIRST[::-1], atol=1e-3)
+
+
+def test_the_sign_of_mathematics(tmp_path: Path) -> None:
+    scan = read_scan(save(tmp_path, body(TOP_FIRST).replace("-", "\u2212")), None)
+    np.testing.assert_allclose(scan.heights, TOP_FIRST[::-1], atol=1e-4)
+
+
+def test_a_factor_of_spip_for_another_quantity(tmp_path: Path) -> None:
+    header = "# File Format = ASCII\n# x-length = 1000\n# y-length = 500\n# Bit2nm = 1.0\n# z-unit = V\n"
+    assert "found values in 'V'" in message_of(save(tmp_path, header + body(TOP_FIRST), "scan.asc"))
+
+
+@pytest.mark.parametrize("place", ["first column", "last column", "first row", "last row"])
+def test_an_axis_is_no_height(tmp_path: Path, place: str) -> None:
+    side, line = place.split()
+    axis = 0.1 * np.arange(TOP_FIRST.shape[0 if line == "column" else 1])
+    order = (axis, TOP_FIRST.T if line == "column" else TOP_FIRST)
+    table = np.vstack(order if side == "first" else order[::-1])
+    table = table.T if line == "column" else table
+    said = message_of(save(tmp_path, body(table)))
+    assert f"found a {place} that goes evenly from 0 to" in said
+    # a tilted mirror with dust is no axis
+    dusty = 0.1 * np.arange(16.0) + 0.2 * np.arange(12.0)[:, None] + (RNG.random((12, 16)) < 0.1)
+    dusty[0], dusty[-1] = dusty[0].min() + 0.1 * np.arange(16), dusty[-1].max() + 0.1 * np.arange(16)
+    read_scan(save(tmp_path, body(dusty)), None)
+
+
+def test_a_second_table(tmp_path: Path) -> None:
+    header = "# Channel: {}\n# Width: 10 um\n# Height: 10 um\n# Value units: {}\n"
+    content = header.format("Height", "nm") + body(TOP_FIRST)
+    message = message_of(save(tmp_path, content + header.format("Phase", "deg") + body(TOP_FIRST)))
+    assert "another header in line 17" in message
+    read_scan(save(tmp_path, content + "# Channel: end of it\n"), None)
+
+
+@pytest.mark.parametrize("name", ["Phase", "Deflection", "Amplitude error"])
+def test_a_text_of_another_quantity_is_not_taken_unasked(tmp_path: Path, name: str) -> None:
+    path = save(
+        tmp_path, f"# Channel: {name}\n# Width: 10 um\n# Height: 10 um\n# Value units: nm\n" + body(TOP_FIRST)
+    )
+    assert f"found only '{name}'" in message_of(path)
+    assert read_scan(path, name).channel == name
+
+
 # --- Keyence -----------------------------------------------------------------------------------------
 
 
@@ -473,3 +528,35 @@ def test_keyence(tmp_path: Path, separator: str, words: tuple[str, ...], channel
 def test_keyence_without_heights(tmp_path: Path) -> None:
     content = _keyence(",", _ENGLISH, "Laser")
     assert "expected heights in a Keyence .csv, found 'Laser'" in message_of(save(tmp_path, content, "scan.csv"))
+
+
+# --- what was not measured, in text ------------------------------------------------------------------
+
+
+def _noisy() -> NDArray[np.float64]:
+    y, x = np.mgrid[:64, :64]
+    return np.asarray(np.round(30 * np.sin(x / 5) + np.random.default_rng(3).normal(0, 5, y.shape), 3), np.float64)
+
+
+_HIGH = _noisy() > 20
+# what a program wrote into a part of the scan -> holes, cropped (bottom, top, left, right), and words of a warning
+_WRITTEN: dict[str, tuple[tuple[Any, ...], float, int, tuple[int, int, int, int], str]] = {
+    "a number of convention": ((_HIGH,), -10000, 1065, (0, 0, 0, 0), "no-data number"),
+    "the largest float": ((slice(0, 10),), 1.70141e38, 0, (0, 10, 0, 0), "no-data number"),
+    "a number five ranges away": ((slice(20, 40), slice(20, 40)), -500, 400, (0, 0, 0, 0), "no-data number"),
+    "zero among the heights": ((slice(20, 40), slice(20, 40)), 0, 400, (0, 0, 0, 0), "one value among heights"),
+    "columns of zero": ((slice(None), slice(50, 64)), 0, 0, (0, 0, 0, 14), "columns of one value"),
+    "a number below all heights": ((slice(20, 40), slice(20, 40)), -60, 0, (0, 0, 0, 0), "apart from all others"),
+}
+
+
+@pytest.mark.parametrize("name", _WRITTEN)
+def test_numbers_that_programs_write_for_no_data(tmp_path: Path, name: str) -> None:
+    place, number, holes, cropped, said = _WRITTEN[name]
+    heights = _noisy()
+    heights[place] = number
+    path = tmp_path / "scan.txt"
+    np.savetxt(path, heights, fmt="%.6g", delimiter="\t")
+    _, record = load_scan(SurfaceSource(path=str(path), pitch_um=0.1, height_unit="nm"))
+    assert (record.holes, record.cropped) == (holes, cropped)
+    assert said in record.warnings[0]

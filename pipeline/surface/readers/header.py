@@ -193,6 +193,9 @@ def _value_unit(file: str, entries: _Entries) -> float | None:
     scale = micrometres(unit)
     if factor is not None:
         key, um = factor
+        if key in _NM_PER_COUNT and unit and scale is None:
+            # SPIP writes this factor for other quantities than heights, too
+            raise fault(file, "heights in a unit of length", f"values in {unit!r}", "export the height channel")
         # a factor beside a unit of length says nothing new where it is 1, and is ambiguous where it is not
         if scale is None or abs(um - scale) <= 1e-6 * scale:
             entries.used.add(key)

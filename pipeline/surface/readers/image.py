@@ -1,15 +1,16 @@
-"""Reads grey images as height maps: codes up to full_code, the first row at the top, without units."""
+"""Reads grey images as height maps: codes up to full_code, the first row at the top, mostly without units."""
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from pipeline.surface.readers import tiff
+from pipeline.surface.readers import image_units, tiff
 from pipeline.surface.readers.common import (
     MAX_SAMPLES,
     check_shape,
@@ -38,13 +39,17 @@ _BY_PILLOW = frozenset(
 
 @dataclass(frozen=True)
 class _Pixels:
-    """The pixels of an image, top row first, the largest code above 0, what they are, and the reading library."""
+    """The pixels of an image, top row first, the largest code above 0, what they are, and the reading library.
+
+    texts: what a PNG's text chunks say.
+    """
 
     stored: NDArray[np.generic]
     full_code: float | None
     form: str
     reader: str
     steps: tuple[float, float] | None = None
+    texts: Mapping[Any, Any] = field(default_factory=dict)
 
 
 def read(path: Path, channel: str | None) -> Scan:
@@ -69,9 +74,22 @@ def read(path: Path, channel: str | None) -> Scan:
         # the text of the tag may have more digits than the samples
         stored_so = float(pixels.stored.dtype.type(no_data)) if pixels.stored.dtype.kind == "f" else no_data
         heights[heights == stored_so] = np.nan
-    names = (_CHANNEL,)
+    ny, nx = heights.shape
+    units = (
+        image_units.of_tiff(found)
+        if found
+        else image_units.of_png(path.name, pixels.texts, (ny, nx), pixels.full_code)
+    )
     return Scan(
-        heights, None, None, pixels.full_code, _CHANNEL, names, pixels.form, pixels.reader, steps=pixels.steps
+        heights,
+        units.um_per_code,
+        units.pitch_um,
+        pixels.full_code,
+        _CHANNEL,
+        (_CHANNEL,),
+        pixels.form,
+        pixels.reader,
+        steps=pixels.steps if units.pitch_um is None else None,
     )
 
 
@@ -116,7 +134,7 @@ def _by_pillow(path: Path, opened: Image.Image, kind: tuple[int, int], found: ti
     elif found and mode.startswith("I;16"):
         full_code = _full_code(stored, kind[1], found)
         form += f", {full_code:g} at most"
-    return _Pixels(stored, full_code, form, library_version("pillow"), steps)
+    return _Pixels(stored, full_code, form, library_version("pillow"), steps, opened.info)
 
 
 def _codes(path: Path, opened: Image.Image, kind: tuple[int, int]) -> tuple[NDArray[np.generic], float | None]:

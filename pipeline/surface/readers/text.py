@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.surface.readers import keyence, xyz
 from pipeline.surface.readers.common import (
+    MIN_SAMPLES,
     check_shape,
     fault,
     library_version,
@@ -29,6 +30,7 @@ _VOID = re.compile(
     r"|[-+]?nan(?:\(\w*\))?|-?1\.#\w+|bad|void|null|none|nil|masked|invalid|n/?a|#n/?a|#\w+[!?/]\w*!?|-+|–|—|\*+|\?+|_+",
     re.IGNORECASE,
 )
+_GROUPED = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
 _INFINITY = re.compile(r"[-+]?inf(?:inity)?", re.IGNORECASE)
 _COMMENT = ("#", "%", "//", "!")
 _REMOVE = "remove that line, or begin it with '#'"
@@ -41,6 +43,8 @@ _QUANTITY_NAME = re.compile(r"[\"']?([A-Za-z][\w ]*?)\s*[(\[]\s*([^)\]\d]{1,3})\
 _AXIS_NAME = re.compile(r"\W*([xyz])\b[^(\[]*(?:[(\[]\s*([^)\]]*)\s*[)\]])?\W*", re.IGNORECASE)
 # largest deviation of evenly spaced axis labels from their mean step
 _EVEN = 1e-3
+# typical deviation of heights beside such labels, in their mean step
+_UNEVEN = 0.1
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,7 @@ def read(path: Path, channel: str | None) -> Scan:
     content = _split(path, _decode(path))
     table = _table(path, content)
     table, steps, labels = _without_labels(content, table)
+    _refuse_axis(path, table)
     triples = table.shape[1] == 3 and table.shape[0] > 3
     warnings: tuple[str, ...] = ()
     header = understand(path.name, content.header, triples)
@@ -82,7 +87,7 @@ def read(path: Path, channel: str | None) -> Scan:
         header = replace(header, steps=header.steps or steps)
     check_shape(path.name, heights.shape)
     name = header.channel or "data"
-    pick_channel(path.name, [name], channel, sole=True)
+    pick_channel(path.name, [name], channel)
     pitch, relative = _pitch(header, heights.shape, triples)
     return Scan(
         heights,
@@ -129,10 +134,12 @@ def utf16_without_mark(head: bytes) -> str | None:
 
 def _split(path: Path, content: str) -> _Content:
     """Separates the header from the rows of numbers. Raises InputError for a line that is neither."""
-    lines = keyence.translated(path.name, content.splitlines())
+    # typographic programs write the sign of mathematics
+    lines = keyence.translated(path.name, content.replace("\u2212", "-").splitlines())
     separator, decimal_comma = _separator(path, lines)
     usual = _typical_row(lines).count("\t")
     found = _Content([], [], [], [], separator, decimal_comma)
+    second = None
     for number, line in enumerate(lines, start=1):
         stripped = line.strip()
         if not stripped:
@@ -144,7 +151,11 @@ def _split(path: Path, content: str) -> _Content:
         if stripped.startswith(_COMMENT) and not _EXCEL_ERROR.match(stripped):
             if not found.rows:
                 found.header.append(line)
+            elif second is None and _key(line) and _key(line) in map(_key, found.header):
+                second = number
             continue
+        if second is not None:
+            raise fault(path.name, "one table", f"another header in line {second}", "keep the table of heights alone")
         if _is_plain(stripped) or _is_row(line, separator, bool(found.rows)):
             found.rows.append(line)
             found.numbers.append(number)
@@ -153,6 +164,11 @@ def _split(path: Path, content: str) -> _Content:
     if not found.rows:
         raise fault(path.name, "a matrix of heights", "no numbers", "export the height data again")
     return found
+
+
+def _key(line: str) -> str:
+    """Returns the key of a `key: value` line; an empty text for any other."""
+    return re.split("[:=]", line)[0].strip(" #%;/!").casefold() if re.search("[:=]", line) else ""
 
 
 def _take_header_line(path: Path, content: _Content, line: str, number: int) -> None:
@@ -272,12 +288,32 @@ def _table(path: Path, content: _Content) -> NDArray[np.float64]:
         row if _is_plain(row) and not _has_empty_cell(row, separator) else _with_nan(row, separator) for row in rows
     ]
     if content.decimal_comma:
+        _refuse_thousands(path, rows, separator)
         rows = [row.replace(",", ".") for row in rows]
     try:
         table = np.loadtxt(rows, dtype=np.float64, delimiter=separator, comments=None, ndmin=2)
     except ValueError as error:
         raise _uneven(path, content, rows, str(error)) from None
     return table
+
+
+def _refuse_thousands(path: Path, rows: list[str], separator: str | None) -> None:
+    """Refuses integers with commas between thousands, which would be taken for decimal points.
+
+    Decimals are printed with equally many digits; here all numbers without a comma are integers below 1000.
+    """
+    with_comma = re.search(_GROUPED, next((row for row in rows if "," in row), ""))
+    if with_comma is None:
+        return
+    looked_at = rows[:: len(rows) // 200 + 1]
+    cells = [cell.lstrip("+-") for row in looked_at for cell in _cells(row, separator) if not _VOID.fullmatch(cell)]
+    plain = [cell for cell in cells if "," not in cell]
+    others = [cell for cell in cells if "," in cell]
+    if not plain or not all(cell.isdecimal() and len(cell) <= 3 for cell in plain):
+        return
+    if others and all(_GROUPED.fullmatch(cell) for cell in others):
+        found = f"{with_comma[0]!r} beside integers such as {plain[0]!r}, which may be thousands or decimals"
+        raise fault(path.name, "numbers", found, "export them without separators of thousands")
 
 
 def _without_outer_separators(rows: list[str], separator: str) -> list[str]:
@@ -341,6 +377,20 @@ def _without_labels(
     if all(cell.isdecimal() for cell in first) and _counts_up(table[0]) and bool((below != np.round(below)).any()):
         return table[1:], None, ", without its index row"
     return table, None, ""
+
+
+def _refuse_axis(path: Path, table: NDArray[np.float64]) -> None:
+    """Refuses a row or column at an edge that is evenly spaced where those beside it are not: an axis."""
+    if min(table.shape) < MIN_SAMPLES:
+        return
+    for lines, word in ((table.T, "column"), (table, "row")):
+        for name, edge, beside in (("first", lines[0], lines[1]), ("last", lines[-1], lines[-2])):
+            steps = np.diff(beside)[np.isfinite(np.diff(beside))]
+            # a few specks of dust do not make heights uneven
+            middle = float(np.median(steps)) if steps.size else 0.0
+            if steps.size and np.median(np.abs(steps - middle)) > _UNEVEN * abs(middle) and _even(edge):
+                found = f"a {name} {word} that goes evenly from {edge[0]:.6g} to {edge[-1]:.6g}, like an axis"
+                raise fault(path.name, "heights alone", found, f"remove that {word}")
 
 
 def _even(labels: NDArray[np.float64]) -> bool:
