@@ -65,11 +65,12 @@ class Stack:
 class StackSize:
     """The size of a stack, known before it is built: samples that are transformed, coefficients that are kept.
 
-    samples: (ny, nx) that are transformed. kept: indices of the coefficients.
-    spacing_per_um, reach: as in `Stack`.
+    samples: (ny, nx) that are transformed. is_part: whether these are a part of the patch.
+    kept: indices of the coefficients. spacing_per_um, reach: as in `Stack`.
     """
 
     samples: tuple[int, int]
+    is_part: bool
     kept: Kept
     spacing_per_um: tuple[float, float]
     reach: tuple[int, int]
@@ -82,11 +83,12 @@ class StackSize:
     def chebyshev_bytes(self, terms: int, itemsize: int) -> resources.Arrays:
         """Lists the arrays of `build` for a Chebyshev stack.
 
-        These are the centred heights and the device's copy, the terms between the kernel's two steps, and the stack.
+        These are the centred heights of a part and the device's copy, the terms between the kernel's two steps, and
+        the stack. The heights of a whole patch are centred already, and shared with the device.
         """
         ny, nx = self.samples
         return {
-            "centred heights, twice": 2 * 8 * ny * nx,
+            "centred heights, twice": 2 * 8 * ny * nx if self.is_part else 0,
             "terms between two transforms": dft_stack.between_bytes(self.kept, ny),
             "stack": self.stack_bytes(terms, itemsize),
         }
@@ -114,7 +116,7 @@ def size(
         floor(min(frequency_max_per_um, 0.5 / pitch) / d + 0.5) + r
         for pitch, d, r in zip(extent.pitch_um, spacing, reach, strict=True)
     )
-    return StackSize(samples, Kept(psi_max, phi_max, reach[0]), spacing, reach)
+    return StackSize(samples, samples != extent.shape, Kept(psi_max, phi_max, reach[0]), spacing, reach)
 
 
 def build(

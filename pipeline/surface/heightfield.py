@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from pipeline.surface.extent import Extent
 
+_ROUNDING = 1e-14
+
 
 @dataclass(frozen=True)
 class HeightField:
@@ -59,6 +61,11 @@ class HeightField:
         return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
 
     def centred(self) -> "HeightField":
-        """Returns the field with the middle of its height range at 0, which changes no intensity."""
+        """Returns the field with the middle of its height range at 0, which changes no intensity.
+
+        A field that is centred to the rounding of its range is returned itself.
+        """
         h = self.heights_um
-        return HeightField(h - 0.5 * (float(h.max()) + float(h.min())), self.pitch_um)
+        low, high = float(h.min()), float(h.max())
+        middle = 0.5 * (low + high)
+        return self if abs(middle) <= _ROUNDING * (high - low) else HeightField(h - middle, self.pitch_um)

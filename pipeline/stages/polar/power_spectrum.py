@@ -5,9 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels import device
 from pipeline.config.models import Config
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
@@ -115,20 +113,13 @@ def load(artifact: Artifact) -> power_spectrum.PolarPowerSpectrum:
     zarr = artifact.folder / _FILE
     found = arrays.attributes(zarr)
     return power_spectrum.PolarPowerSpectrum(
-        _on_a_cache_line(arrays.load(zarr, "E")),
+        arrays.load(zarr, "E"),
         arrays.load(zarr, "r"),
         Azimuths(**found["azimuths"]),
         found["s_max_per_um"],
         found["sigma_um"],
         tuple(found["band_per_um"]),
     )
-
-
-def _on_a_cache_line(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Copies values once to aligned memory, from which a device that shares it reads without a copy per table."""
-    placed = device.empty(values.shape, values.dtype)
-    placed[...] = values
-    return placed
 
 
 def _work(config: Config) -> str:
