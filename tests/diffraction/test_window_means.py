@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.diffraction import expansion, power_spectrum, reference
+from pipeline.diffraction import dft_stack, expansion, power_spectrum, reference
 from pipeline.diffraction.polar_grid import Azimuths
 from pipeline.diffraction.reference import Reference, power_direct, xyz_direct
 from pipeline.optics.coherence import Coherence
@@ -39,14 +39,17 @@ def test_the_reference_is_the_mean_over_windows() -> None:
     np.testing.assert_allclose(found, np.mean(each, axis=0), rtol=1e-6)
 
 
-# windows of 1.5 um: one stack serves all on 15 um; on 33 um, each has its own
-@pytest.mark.parametrize(("nx", "ny", "count"), [(150, 150, 9), (133, 60, 3), (104, 151, 6), (331, 320, 9)])
-@pytest.mark.parametrize("held_bytes", [2**29, 0], ids=["held", "in parts"])
+# a stack of one window of 1.5 um has 216 x 216 samples
+@pytest.mark.parametrize(
+    ("nx", "ny", "count"), [(150, 150, 9), (133, 60, 3), (104, 151, 6), (221, 230, 9), (60, 80, 1)]
+)
+@pytest.mark.parametrize(("held_bytes", "widest"), [(2**29, 30), (0, 30), (0, 0)], ids=["held", "in parts", "each"])
 def test_the_reference_agrees_with_sums_over_samples_at_every_window(
-    monkeypatch: pytest.MonkeyPatch, nx: int, ny: int, count: int, held_bytes: int
+    monkeypatch: pytest.MonkeyPatch, nx: int, ny: int, count: int, held_bytes: int, widest: float
 ) -> None:
-    """A stack in parts of its terms, and one for all windows, change nothing."""
+    """A stack in parts of its terms, one for all windows and one for each change nothing."""
     monkeypatch.setattr(reference, "_HELD_BYTES", held_bytes)
+    monkeypatch.setattr(dft_stack, "_WIDEST_SIGMAS", widest)
     field = rough(nx, ny)
     places = windows.places(field.extent, Coherence(sigma_um=SIGMA))
     assert places.count == count
@@ -78,6 +81,17 @@ def test_e_of_one_stack_equals_sums_over_samples_at_every_window(nx: int, ny: in
     assert np.all(found[unknown] == 0.0)
     level = np.mean(expected[~unknown])
     np.testing.assert_allclose(found[~unknown], expected[~unknown], rtol=1e-4, atol=2e-4 * level)
+
+
+def test_e_of_a_stack_for_each_window_is_that_of_one_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    field, layout, budget = rough(150, 104), PolarLayout(rings=20, azimuths=64), plan.Budget(0.5, 7500.0)
+    places = windows.places(field.extent, Coherence(sigma_um=SIGMA))
+    found = []
+    for widest in (30.0, 0.0):
+        monkeypatch.setattr(dft_stack, "_WIDEST_SIGMAS", widest)
+        trial = plan.start(field, places, SIGMA, Light(), None, budget, layout)
+        found.append(trial.mean_power_spectrum(Azimuths(64)).values)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-3, atol=1e-4 * np.mean(found[0]))
 
 
 def test_e_is_the_mean_over_windows_and_its_speckle_has_less_contrast() -> None:
