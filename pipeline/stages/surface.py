@@ -178,4 +178,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 7, (), _parameters, _produce)
+SURFACE = Stage("surface", 8, (), _parameters, _produce)
