@@ -96,4 +96,4 @@ def _load(inputs: Inputs) -> "Stored":
     return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
 
 
-TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)
+TEXTURES = Stage("textures", 2, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)
