@@ -135,7 +135,7 @@ def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
     )
     kept = _components(moments, metric @ _mirror_texel(full), outputs)
     project = (kept.T @ metric).astype(np.float32)
-    basis = np.linalg.solve(metric, kept).T.reshape(outputs, 3, table.w_terms)
+    basis = np.asarray(np.linalg.solve(metric, kept).T.reshape(outputs, 3, table.w_terms))
     return Textures(np.matmul(project, full.values), basis, table.grid)
 
 
@@ -155,7 +155,7 @@ def _components(moments: Array, first: Array, count: int) -> Array:
     unit = first[:, None] / length
     across = np.eye(len(first)) - unit @ unit.T
     _, vectors = np.linalg.eigh(across @ moments @ across)
-    return np.concatenate([unit, vectors[:, :-count:-1]], axis=1)
+    return np.asarray(np.concatenate([unit, vectors[:, :-count:-1]], axis=1))
 
 
 def _unit_moments(texels: Array) -> Array:
