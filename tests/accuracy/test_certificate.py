@@ -2,6 +2,7 @@
 
 import pytest
 
+from pipeline.accuracy.checks import check_flank
 from pipeline.errors import AccuracyError
 from pipeline.stages.polar import certificate
 from pipeline.tables.evaluate import table_evaluator
@@ -27,7 +28,7 @@ def test_a_planned_table_keeps_the_flank_of_the_specular_lobe() -> None:
     reference, errors = exact_of(found), []
     for sections in ({}, {"table": {"rings": 60, "azimuths": 640}}):
         table, _ = planned(config(**sections))
-        flank = certificate.check_flank(table_evaluator(table, found.radiometry), reference, found)
+        flank = check_flank(table_evaluator(table, found.radiometry), reference, found)
         assert flank is not None
         assert flank.kept == (flank.colour.maximum <= 5.0)
         assert flank.largest.delta_e == flank.colour.maximum
@@ -39,7 +40,7 @@ def test_a_planned_table_keeps_the_flank_of_the_specular_lobe() -> None:
 
 def test_lights_whose_mirror_direction_is_not_seen_have_no_flank() -> None:
     found = config(scene={"lights": [{"theta_deg": 60}], "views": {"theta_max_deg": 20}})
-    assert certificate.check_flank(exact_of(found).xyz, exact_of(found), found) is None
+    assert check_flank(exact_of(found).xyz, exact_of(found), found) is None
 
 
 def test_a_table_that_misses_its_budget_is_refused() -> None:
