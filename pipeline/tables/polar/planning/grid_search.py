@@ -51,14 +51,11 @@ class Grids:
         """Computes the first numbers of rings and azimuths: the error falls with the square of either."""
         finer = sqrt(_BASE_DELTA_E / self._delta_e)
         window = self._bake.sigma_um / _BASE_SIGMA_UM
-        r0 = self._widest_r0
+        step = _BASE_RING_STEP / finer
         if self._is_line:
-            x = asinh(self._rho_max / r0)
+            x = asinh(self._rho_max / self._widest_r0)
             step = 0.5 * x / (self._bake.radius_per_um[-1] * 2.0 * np.pi * self._bake.sigma_um) / finer
-        else:
-            step = _BASE_RING_STEP / finer
-            r0 = float(np.clip(self._distance / step, _LEAST_SHARE_OF_R0 * r0, r0))
-            x = asinh(self._rho_max / r0)
+        x = asinh(self._rho_max / self._r0_at(step))
         rings = int(np.clip(x / step, self._least_rings, _MOST_RINGS))
         azimuths = int(np.clip(_BASE_AZIMUTHS * window * finer, _LEAST_AZIMUTHS, _MOST_AZIMUTHS))
         layout = self._layout
@@ -94,11 +91,14 @@ class Grids:
 
     @property
     def _least_rings(self) -> int:
-        """Least number of rings: those of the specular lobe, which few test directions meet, at their distance."""
-        if self._is_line:
-            lobe = lobe_width(self._bake.lambda_min_nm, self._bake.sigma_um)
-            return max(_LEAST_RINGS, ceil(self._span(self._widest_r0) / lobe))
-        return max(_LEAST_RINGS, ceil(self._span(_LEAST_SHARE_OF_R0 * self._widest_r0) / self._distance) + 1)
+        """Least number of rings, whatever the budget: the step that puts even rings one width of the lobe apart."""
+        step = lobe_width(self._bake.lambda_min_nm, self._bake.sigma_um) / self._widest_r0
+        return max(_LEAST_RINGS, ceil(asinh(self._rho_max / self._r0_at(step)) / step))
+
+    def _r0_at(self, step: float) -> float:
+        """Chooses the radius below which rings are evenly spaced, for a step of arsinh(rho / r0)."""
+        widest = self._widest_r0
+        return widest if self._is_line else float(np.clip(self._distance / step, _LEAST_SHARE_OF_R0 * widest, widest))
 
     def rings(self, count: int) -> Rings:
         """Places so many rings."""
