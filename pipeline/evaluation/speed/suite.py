@@ -70,6 +70,7 @@ FULL = Effort(
     polar=(
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((50, 640), (70, 896), (100, 1280))),
         MAIN,
+        PolarLayout(rings=157, azimuths=1600),
         GRATING,
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((200, 2560), (280, 3584))),
     ),
