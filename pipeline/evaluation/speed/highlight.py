@@ -8,7 +8,7 @@ from pipeline.accuracy.checks import FlankCheck, check_flank
 from pipeline.accuracy.exact import reference_of
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import MeanReference
+from pipeline.diffraction.reference import Reference
 from pipeline.evaluation.speed import setting
 from pipeline.evaluation.speed.truth import MapTruth
 from pipeline.optics import geometry
@@ -36,7 +36,7 @@ class PlannedTable:
     map_error: ColourError
 
 
-def planned(field: HeightField, config: Config, truth: MapTruth, reference: MeanReference) -> PlannedTable:
+def planned(field: HeightField, config: Config, truth: MapTruth, reference: Reference) -> PlannedTable:
     """Plan and make the table of a surface, and measure its largest errors."""
     power, chosen = setting.first_bake(field, config, PolarLayout())
     table = chosen.table(power, config.light)
