@@ -90,7 +90,17 @@ def _certified(certificate: dict[str, Any]) -> str:
         f"mean CIELAB error {certificate['measured']:.3f} at {certificate['exposure_ru']:g} RU on "
         f"{certificate['random']['directions']} random directions"
         + ("" if certificate["delta_e"] is None else f", {certificate['delta_e']:g} allowed")
+        + _flank(certificate["flank"])
     )
+
+
+def _flank(flank: dict[str, Any] | None) -> str:
+    """The largest error beside the mirror directions, and whether it is within its limit."""
+    if flank is None:
+        return ""
+    error = flank["colour"]
+    verdict = "" if flank["kept"] else ", above the limit of 5"
+    return f"; beside mirror directions at most {error['maximum']:.2g} at {error['exposure_ru']:g} RU{verdict}"
 
 
 def load_all(paths: tuple[Path, ...], store_root: Path | None, until: str) -> "list[Config]":

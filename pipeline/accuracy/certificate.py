@@ -1,4 +1,4 @@
-"""The certificate of a table: its errors on directions that its planning did not use.
+"""The certificate of a table: its errors on directions that its planning did not use, anywhere and beside mirrors.
 
 The reference shares no approximation with the table: it gathers a float64 stack with more terms than needed, directly
 at every direction and every nanometre. Every bake compares the reference itself with sums over samples, on a few
@@ -7,7 +7,7 @@ directions.
 
 from dataclasses import dataclass
 
-from pipeline.accuracy.checks import RandomCheck, RelativeError, check_table
+from pipeline.accuracy.checks import FlankCheck, RandomCheck, RelativeError, check_table
 from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
@@ -24,13 +24,15 @@ class Certificate:
 
     delta_e: allowed mean CIELAB error; None where no budget is set. exposure_ru: exposure of both errors, RU.
     measured: mean CIELAB error at `exposure_ru`. random: the table against the reference on random directions.
-    reference: the reference against sums over samples. certifies: what these errors are of, in words.
+    flank: the same beside the mirror directions; None where a scene sees none of them. reference: the reference
+    against sums over samples. certifies: what these errors are of, in words.
     """
 
     delta_e: float | None
     exposure_ru: float
     measured: float
     random: RandomCheck
+    flank: FlankCheck | None
     reference: RelativeError
     certifies: str = CERTIFIES
 
@@ -55,10 +57,10 @@ def errors_of(
     interpolate: Evaluator, reference: Reference, config: Config, progress: Progress = silent
 ) -> Certificate:
     """Measures a table as `measure` does, and refuses no error of the table."""
-    random, checked = check_table(interpolate, reference, config)
+    random, flank, checked = check_table(interpolate, reference, config)
     progress("reference", 1.0)
     exposure = config.accuracy.exposure_ru
-    return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, checked)
+    return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, flank, checked)
 
 
 def refuse_clamping(random: RandomCheck, config: Config) -> None:

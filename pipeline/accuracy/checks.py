@@ -3,6 +3,7 @@
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference, power_direct
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
+from pipeline.optics.coherence import FLANK_DELTA_E, FLANK_RU, FLANK_WIDTHS, lobe_width
 from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import random_pairs
+from pipeline.optics.random_directions import flank_pairs, random_pairs
 from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import Evaluator, Map, never_negative
@@ -29,6 +31,15 @@ _SEED = 20140601
 MIRROR_FLOOR = 1e-7
 # the largest error of the reference, of the mirror
 _REFERENCE_TOLERANCE = 1e-9
+
+
+def certified_directions(windows: int) -> int:
+    """Computes the number of directions of a certificate, random ones and those beside mirror directions."""
+    return random_directions(windows) + _flank_directions(windows)
+
+
+def _flank_directions(windows: int) -> int:
+    return random_directions(windows) // 5
 
 
 def random_directions(windows: int) -> int:
@@ -114,17 +125,120 @@ def _compared(interpolated: Array, truth: Array, config: Config, wi: Array, wr: 
     return RandomCheck(len(wi), power, _colour_errors(config, found, truth), _clamped(config, interpolated))
 
 
+# why a table errs most where it does: on the flank XYZ falls by orders of magnitude from one ring to the next
+Reason = Literal["flank of the specular lobe", "speckle between texels"]
+
+
+@dataclass(frozen=True)
+class LargestError:
+    """The largest CIELAB error over a set of directions, and its place.
+
+    delta_e: the error, at `exposure_ru`, RU. light_deg, view_deg: polar angles of light and view.
+    uv: (u, v). lobe_widths: |(u, v)|, the distance from the mirror direction, in widths of the specular lobe at the
+    luminous middle. found, exact: XYZ there, RU. reason: of a table between its texels.
+    """
+
+    delta_e: float
+    exposure_ru: float
+    light_deg: float
+    view_deg: float
+    uv: tuple[float, float]
+    lobe_widths: float
+    found: tuple[float, float, float]
+    exact: tuple[float, float, float]
+    reason: Reason
+
+
+def largest_error(
+    config: Config, directions: tuple[Array, Array], found: Array, truth: Array, exposure_ru: float
+) -> LargestError:
+    """Finds the largest CIELAB error.
+
+    config: its light, window and material are read. directions: unit vectors wi, wr (n, 3). found, truth: XYZ (n, 3).
+    exposure_ru: exposure at which colours are compared, RU.
+    """
+    unit = config.radiometry.unit
+    errors = delta_e(found / unit, truth / unit, exposure_ru)
+    worst = int(np.argmax(errors))
+    wi, wr = (one[worst] for one in directions)
+    u, v, _ = geometry.uvw(wi, wr)
+    widths = float(np.hypot(u, v)) / lobe_width(config.light.middle_nm, config.coherence.sigma_um)
+    light, view = (float(np.degrees(np.arccos(min(1.0, one[2])))) for one in (wi, wr))
+    x, y, z = found[worst] / unit
+    true_x, true_y, true_z = truth[worst] / unit
+    return LargestError(
+        delta_e=float(errors[worst]),
+        exposure_ru=exposure_ru,
+        light_deg=light,
+        view_deg=view,
+        uv=(float(u), float(v)),
+        lobe_widths=widths,
+        found=(float(x), float(y), float(z)),
+        exact=(float(true_x), float(true_y), float(true_z)),
+        reason="flank of the specular lobe" if widths <= FLANK_WIDTHS else "speckle between texels",
+    )
+
+
+@dataclass(frozen=True)
+class FlankCheck:
+    """Errors of a table against the reference on the flank of the specular lobe, beside mirror directions.
+
+    directions: their number, within `lobe_widths` widths of the lobe. colour: CIELAB errors at 1000 RU.
+    largest: the largest of them. kept: whether it is at most 5.
+    """
+
+    directions: int
+    lobe_widths: float
+    colour: ColourError
+    largest: LargestError
+    kept: bool
+
+
+def check_flank(interpolate: Evaluator, reference: Reference, config: Config) -> FlankCheck | None:
+    """Compares a table with the reference on the flank of the specular lobe, for lights at all angles.
+
+    Random directions hardly meet it, and a mean over a map hides it.
+
+    interpolate: computes the table's XYZ for pairs of directions. reference: of the same height field.
+    config: its light, material, window and scene are read.
+    Returns None where the scene sees no direction of it.
+    """
+    wi, wr = _flank_pairs(config, reference.places.count)
+    if not len(wi):
+        return None
+    return _flank(interpolate(wi, wr), reference.xyz(config.light, config.material, wi, wr), config, wi, wr)
+
+
+def _flank_pairs(config: Config, windows: int) -> tuple[Array, Array]:
+    """Draws the pairs of light and view on the flank that the scene sees."""
+    rng, count = np.random.default_rng(_SEED + 2), _flank_directions(windows)
+    reach = FLANK_WIDTHS * lobe_width(config.light.middle_nm, config.coherence.sigma_um)
+    rho, phi = reach * rng.random(count), 2.0 * np.pi * rng.random(count)
+    wi, wr = flank_pairs(config.scene, rho, phi, _SEED + 3)
+    seen = np.isfinite(wr[:, 2])
+    return wi[seen], wr[seen]
+
+
+def _flank(interpolated: Array, truth: Array, config: Config, wi: Array, wr: Array) -> FlankCheck:
+    found, unit = never_negative(interpolated), config.radiometry.unit
+    colour = colour_error(found / unit, truth / unit, FLANK_RU)
+    largest = largest_error(config, (wi, wr), found, truth, FLANK_RU)
+    return FlankCheck(len(wi), FLANK_WIDTHS, colour, largest, colour.maximum <= FLANK_DELTA_E)
+
+
 @dataclass(frozen=True)
 class MapCheck:
     """Errors of a table against the reference on the map of one light.
 
     views: the map. table, reference: XYZ (size, size, 3), RU. colour: CIELAB errors, one for each exposure.
+    largest: the largest of them at each exposure.
     """
 
     views: Map
     table: Array
     reference: Array
     colour: list[ColourError]
+    largest: list[LargestError]
 
     def delta_e_image(self, exposure_ru: float) -> Array:
         """Computes the CIELAB error (size, size) at an exposure, RU."""
@@ -152,20 +266,22 @@ def check_map(
     truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
     found = evaluate(wi, wr)
     unit, errors = config.radiometry.unit, _colour_errors(config, found, truth)
-    return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors)
+    largest = [largest_error(config, (wi, wr), found, truth, error.exposure_ru) for error in errors]
+    return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors, largest)
 
 
 def check_table(
     interpolate: Evaluator, reference: Reference, config: Config, directions: int = 3
-) -> tuple[RandomCheck, RelativeError]:
-    """Compares a table with the reference, as `check_random` does, and the reference with plain sums over samples.
+) -> tuple[RandomCheck, FlankCheck | None, RelativeError]:
+    """Compares a table with the reference, as `check_random` and `check_flank` do, and the reference with plain sums.
 
     The sums are those of the window in the middle, on a few directions, each at one wavelength. The reference answers
-    for both at once, because it may have to make its stack for every answer.
+    for all at once, because it may have to make its stack for every answer.
 
     interpolate, reference: as in `check_random`. config: its light, material, scene, window and exposure are read.
     directions: number of random directions of the sums; a mirror direction is added.
-    Returns the errors of the table, and relative errors of |P|^2 of the reference.
+    Returns the errors of the table on random directions and on the flank of the specular lobe, and relative errors of
+    |P|^2 of the reference.
     Raises AccuracyError where the two algorithms of the reference differ by more than 1e-9 of the mirror, because
     then no error that is measured against the reference can be trusted.
     """
@@ -175,7 +291,9 @@ def check_table(
     nodes = trapezoid(config.light, 100.0).lambda_nm
     direction = np.arange(len(uvw))
     node = direction % len(nodes)
-    wi, wr = random_pairs(config.scene, random_directions(reference.places.count), _SEED)
+    windows = reference.places.count
+    random, flank = random_pairs(config.scene, random_directions(windows), _SEED), _flank_pairs(config, windows)
+    wi, wr = (np.concatenate(both) for both in zip(random, flank, strict=True))
     truth, middle = reference.xyz_and_middle(config.light, config.material, wi, wr, uvw, nodes)
     fast = middle[direction, node]
     direct = _direct_sums(reference.field, config.coherence.sigma_um, uvw, nodes[node])
@@ -186,7 +304,9 @@ def check_table(
             f"mirror, more than {_REFERENCE_TOLERANCE:g}; please report this config"
         )
     checked = relative_error(fast[known], direct[known], MIRROR_FLOOR)
-    return _compared(interpolate(wi, wr), truth, config, wi, wr), checked
+    found, count = interpolate(wi, wr), len(random[0])
+    beside = _flank(found[count:], truth[count:], config, *flank) if len(flank[0]) else None
+    return _compared(found[:count], truth[:count], config, *random), beside, checked
 
 
 def _direct_sums(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: Array) -> Array:

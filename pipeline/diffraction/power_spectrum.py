@@ -23,10 +23,10 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import MIDDLE, Places
 
 # distances of radii in sigma_f. At a distance of 1, interpolation on 8 radii errs by up to a tenth of E, which an
-# integral over wavelengths averages out and a laser line does not. Near the origin, where the flank of the specular
-# lobe is steep, nothing averages.
+# integral over wavelengths averages out and a laser line does not. Over the specular lobe and its flank, which is
+# steep, nothing averages.
 SPACING, SPACING_OF_A_LINE, _SPACING_AT_ZERO = 1.0, 0.4, 0.25
-_COARSENS_OVER = 30.0  # sigma_f
+_LOBE, _COARSENS_UNTIL = 6.0, 30.0  # sigma_f
 _SPARE_RADII = 5
 # s_max in units of 4 pi / lambda_min. The margin lets neighbouring rings share interpolation points: the spectral
 # integral takes 12 to 25 % less work for one more Chebyshev node
@@ -114,7 +114,7 @@ def radii(sigma_um: float, r_max_per_um: float, spacing: float = SPACING) -> Arr
     width = sigma_f(sigma_um)
     nodes = [0.0]
     while nodes[-1] < r_max_per_um:
-        share = min(1.0, nodes[-1] / (_COARSENS_OVER * width))
+        share = min(1.0, max(0.0, nodes[-1] / width - _LOBE) / (_COARSENS_UNTIL - _LOBE))
         nodes.append(nodes[-1] + width * (_SPACING_AT_ZERO + (spacing - _SPACING_AT_ZERO) * share))
     return np.array(nodes + [nodes[-1] + width * spacing * i for i in range(1, _SPARE_RADII)])
 

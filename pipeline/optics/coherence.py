@@ -26,9 +26,19 @@ class Coherence(Validated):
     windows: Literal["auto", "centre"] = "auto"
 
 
+# the flank of the specular lobe: (u, v) within so many of its widths, the largest CIELAB error allowed there, and the
+# exposure in RU at which it is measured
+FLANK_WIDTHS, FLANK_DELTA_E, FLANK_RU = 6.0, 5.0, 1000.0
+
+
 def sigma_f(sigma_um: float) -> float:
     """Computes the width of the window's transform, sigma_f = 1 / (2 pi sigma), 1/um ([D14] eq. 8)."""
     return 1.0 / (2.0 * pi * sigma_um)
+
+
+def lobe_width(lambda_nm: float, sigma_um: float) -> float:
+    """Computes the width of the specular lobe in (u, v), lambda sigma_f, where |P|^2 has fallen to 1 / e."""
+    return 1e-3 * lambda_nm * sigma_f(sigma_um)
 
 
 def window(x_um: Array, sigma_um: float) -> Array:

@@ -15,6 +15,8 @@ from pipeline.validated import Pair, Validated, existing_file, is_csv
 
 # the wavelengths, nm, that the CIE's observers of 1931 and 1964 cover
 SHORTEST_NM, LONGEST_NM = 360, 830
+# the middle of D65, weighted by ybar
+_LUMINOUS_NM = 545.0
 # the step, nm, at which integrals over wavelength have converged: docs/accuracy.md
 FINE_STEP_NM = 1.0
 # columns of data/illuminants.csv; other names are looked up in colour-science, whose import takes 1.5 s
@@ -52,6 +54,13 @@ class Light(Validated):
     def lambda_min_nm(self) -> float:
         """The shortest wavelength, nm."""
         return self.illuminant.lambda_nm if isinstance(self.illuminant, LaserLine) else self.range_nm[0]
+
+    @property
+    def middle_nm(self) -> float:
+        """The luminous middle, nm: the wavelength of a laser line, else 545 nm if it is in range."""
+        if self.is_line:
+            return self.lambda_min_nm
+        return min(max(_LUMINOUS_NM, self.range_nm[0]), self.range_nm[1])
 
     @field_validator("range_nm")
     @classmethod

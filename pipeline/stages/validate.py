@@ -63,10 +63,11 @@ def _measured(
         check = checks.check_map(evaluate, reference, config, towards, radius, progress)
         picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
         drawn[f"comparison_{render.map_name(light)}"] = picture
-        maps.append({**light.model_dump(), "colour": [asdict(error) for error in check.colour]})
+        errors = {key: [asdict(error) for error in getattr(check, key)] for key in ("colour", "largest")}
+        maps.append({**light.model_dump(), **errors})
     results: Summary = {
         # both were measured for the certificate
-        **{name: inputs.summary("textures")["certificate"][name] for name in ("reference", "random")},
+        **{name: inputs.summary("textures")["certificate"][name] for name in ("reference", "random", "flank")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
@@ -129,4 +130,4 @@ def _work(config: Config) -> str:
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render")
-    return Stage("validate", 7, inputs, _parameters, _produce, uses_device=True, work=_work)
+    return Stage("validate", 8, inputs, _parameters, _produce, uses_device=True, work=_work)

@@ -12,7 +12,7 @@ from pipeline.stages.stage import Inputs
 Rows = list[list[str]]
 
 
-ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max")
+ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max", "place of the largest")
 
 
 def error_rows(results: dict[str, Any]) -> Rows:
@@ -21,13 +21,26 @@ def error_rows(results: dict[str, Any]) -> Rows:
     results: the summary of the stage "validate".
     Returns rows with the columns ERROR_COLUMNS.
     """
-    places = [(f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", m["colour"]) for m in results["maps"]]
-    places.append(("random directions", results["random"]["colour"]))
-    return [
-        [place, f"{e['exposure_ru']:g}", *(f"{e[key]:.3f}" for key in ("mean", "percentile_99", "maximum"))]
-        for place, errors in places
-        for e in errors
+    sets = [
+        (f"map {m['theta_deg']:g}°, {m['phi_deg']:g}°", e, _place(one))
+        for m in results["maps"]
+        for e, one in zip(m["colour"], m["largest"], strict=True)
     ]
+    sets += [("random directions", e, "") for e in results["random"]["colour"]]
+    if (flank := results["flank"]) is not None:
+        name = f"within {flank['lobe_widths']:g} lobe widths of mirrors"
+        sets.append((name, flank["colour"], _place(flank["largest"])))
+    return [
+        [name, f"{e['exposure_ru']:g}", *(f"{e[key]:.3f}" for key in ("mean", "percentile_99", "maximum")), place]
+        for name, e, place in sets
+    ]
+
+
+def _place(largest: dict[str, Any]) -> str:
+    """Says where an error is the largest, and why."""
+    if not largest["delta_e"]:
+        return ""
+    return f"{largest['reason']}, {largest['lobe_widths']:.1f} lobe widths from the mirror"
 
 
 def _surface_rows(summary: dict[str, Any]) -> Rows:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from pipeline.accuracy.checks import check_flank
 from pipeline.errors import AccuracyError
 from pipeline.stages.polar import certificate
 from pipeline.tables.evaluate import table_evaluator
@@ -19,6 +20,27 @@ def test_a_planned_table_keeps_its_budget_on_random_directions(delta_e: float) -
     assert certified.random.directions == 2000
     assert certified.reference.maximum < 1e-6
     assert [e.exposure_ru for e in certified.random.colour] == [1.0, 1000.0, 7500.0]
+
+
+def test_a_planned_table_keeps_the_flank_of_the_specular_lobe() -> None:
+    """Few random directions lie there, so that a table of the same mean error may miss it."""
+    found = config()
+    reference, errors = exact_of(found), []
+    for sections in ({}, {"table": {"rings": 60, "azimuths": 640}}):
+        table, _ = planned(config(**sections))
+        flank = check_flank(table_evaluator(table, found.radiometry), reference, found)
+        assert flank is not None
+        assert flank.kept == (flank.colour.maximum <= 5.0)
+        assert flank.largest.delta_e == flank.colour.maximum
+        assert flank.largest.lobe_widths <= flank.lobe_widths
+        assert flank.largest.reason == "flank of the specular lobe"
+        errors.append(flank.colour.maximum)
+    assert errors[0] <= 5.0 < errors[1]
+
+
+def test_lights_whose_mirror_direction_is_not_seen_have_no_flank() -> None:
+    found = config(scene={"lights": [{"theta_deg": 60}], "views": {"theta_max_deg": 20}})
+    assert check_flank(exact_of(found).xyz, exact_of(found), found) is None
 
 
 def test_a_table_that_misses_its_budget_is_refused() -> None:

@@ -86,6 +86,18 @@ def test_five_shapes_do_not_fit_one_texture() -> None:
     assert np.max(np.abs(compress(table, 1, None).table().values - table.values)) > 0.1
 
 
+def test_every_number_of_textures_keeps_the_mirror_directions() -> None:
+    """The first ring is one point, with a shape that nothing else in the table has."""
+    amplitude = noise(9, 24, 96)
+    amplitude[:8, :4], amplitude[8] = 0.0, np.arange(24)[:, None] < 4
+    samples_of = table_of(noise(9, 3, W_TERMS), amplitude).values.reshape(24, -1, 96)
+    values = cubic_spline.coefficients(np.ascontiguousarray(samples_of)).reshape(24, 3, W_TERMS, 96)
+    table = PolarTable(values, GRID)
+    mirror = np.stack([np.zeros(9), np.zeros(9), -np.linspace(0.1, 2.0, 9)], axis=-1)
+    for textures in (1, 2):
+        np.testing.assert_allclose(look_up(compress(table, textures, None), mirror), table.look_up(mirror), atol=2e-5)
+
+
 def test_dim_texels_count_as_much_as_bright_ones() -> None:
     # half of the azimuths are a million times dimmer and have another shape; four more shapes vary the others by 1e-3
     dim = np.arange(96) < 48

@@ -120,8 +120,8 @@ class PolarLoss(StorageLoss):
     textures: number of RGBA textures; `most_textures` would hold the whole table. error: of the stored textures
     against the exact sum. added: against the table as baked. added_in_mirror: the same in the mirror directions of
     the lights, at 1 RU. y_in_mirror: relative errors of Y there. mirror_kept: whether `added_in_mirror` is on average
-    below the just noticeable difference, 2.3. subnormal_share: of all values, those that half floats store with fewer
-    than 11 bits; None for float.
+    below the just noticeable difference, 2.3, and `y_in_mirror` nowhere above 0.05. subnormal_share: of all values,
+    those that half floats store with fewer than 11 bits; None for float.
     """
 
     layout: Literal["polar"]

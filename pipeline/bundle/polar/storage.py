@@ -33,6 +33,8 @@ _SEED = 20160816
 _MIRROR_EXPOSURE_RU = 1.0
 # the just noticeable CIELAB difference (Mahy, Van Eycken & Oosterlinck 1994)
 _NOTICEABLE_DELTA_E = 2.3
+# largest relative error of Y in a mirror direction: colours clip there, which hides errors from CIELAB
+_MIRROR_KEPT = 0.05
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,7 @@ class _Measure:
         in_half = self._config.publish.precision == "half"
         added_in_mirror = self._errors(mirror, self._mirror, _MIRROR_EXPOSURE_RU)
         y_after, y_before = (xyz[:, 1] / self._mirror_y for xyz in (mirror, self._mirror))
+        y_in_mirror = relative_error(y_after, y_before, MIRROR_FLOOR)
         return PolarLoss(
             layout="polar",
             directions=len(self._wi),
@@ -158,8 +161,8 @@ class _Measure:
             error=self._errors(after, self._truth, exposure),
             added=self._errors(after, self._before, exposure),
             added_in_mirror=added_in_mirror,
-            y_in_mirror=relative_error(y_after, y_before, MIRROR_FLOOR),
-            mirror_kept=added_in_mirror.mean <= _NOTICEABLE_DELTA_E,
+            y_in_mirror=y_in_mirror,
+            mirror_kept=added_in_mirror.mean <= _NOTICEABLE_DELTA_E and y_in_mirror.maximum <= _MIRROR_KEPT,
             subnormal_share=float(np.mean(stored.subnormal)) if in_half else None,
         )
 

@@ -42,6 +42,15 @@ def of_surface(found: SurfaceSpeed, machine: Machine) -> list[Check]:
         stored = found.point(TEXTURES, **settings_of(MAIN), textures=count)
         remark = f"99th percentile {stored.error.percentile_99:.3g}" if stored else ""
         check(f"textures_{count}", stored.error.mean if stored else None, remark)
+        check(f"mirror_{count}", stored.mirror_error if stored else None, "")
+    planned, flank = found.planned, found.planned.flank
+    remark = f"{planned.texels} texels, mean {planned.map_error.mean:.2g}"
+    check("largest_of_map", planned.map_error.maximum, remark)
+    if flank is not None:
+        at = flank.largest
+        place = f"light at {at.light_deg:.0f} degrees, {at.lobe_widths:.1f} lobe widths away"
+        remark = f"{flank.directions} directions; {place}"
+        check("largest_of_flank", flank.colour.maximum, remark)
 
     total, second = found.stages.total, found.second_light_s
     work = _WIDE_WORK if machine.vector_width >= _WIDE else _NARROW_WORK

@@ -11,7 +11,8 @@ from pipeline.bundle.polar.storage import Stored
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.evaluation import plain_numpy
-from pipeline.evaluation.speed import memory, nufft, polar_bake, setting, transforms
+from pipeline.evaluation.speed import highlight, memory, nufft, polar_bake, setting, transforms
+from pipeline.evaluation.speed.highlight import MirrorTruth, PlannedTable
 from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.nufft import NufftRun
 from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM, Paper
@@ -69,6 +70,7 @@ FULL = Effort(
     polar=(
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((50, 640), (70, 896), (100, 1280))),
         MAIN,
+        PolarLayout(rings=157, azimuths=1600),
         GRATING,
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((200, 2560), (280, 3584))),
     ),
@@ -101,7 +103,8 @@ class Point:
 
     method: one of the names above. settings: resolution and step_nm, or rings, azimuths and w_terms and, where
     compressed, textures. texels: of the grid. seconds: from the height field to the table. bytes: of the table as
-    float32, or of its textures. scaled: whether the seconds are those of a sample, scaled by its size.
+    float32, or of its textures. scaled: whether the seconds are those of a sample, scaled by its size. mirror_error:
+    largest relative error of X, Y or Z in the mirror directions of lights at 0 to 85 degrees, of textures.
     """
 
     method: str
@@ -111,6 +114,7 @@ class Point:
     bytes: int
     error: ColourError
     scaled: bool = False
+    mirror_error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -120,8 +124,8 @@ class SurfaceSpeed:
     samples: (ny, nx). terms, nodes, w_terms: of the polar table of layout MAIN, as are stages and second_light_s.
     timed: work and seconds of stages and kernels. agreement: difference of "nufft" and "numpy" from the kernels, of
     samples over max(sample, 1e-7 of the mirror). memory_bytes: the peak of a process that bakes that table. notes:
-    omissions with their reasons. whole_run_s: a process from its start to the table, kernels warm; whole_run_fault:
-    why it was not measured.
+    omissions with their reasons. planned: the table of the planner. whole_run_s: a process from its start to the
+    table, kernels warm; whole_run_fault: why it was not measured.
     """
 
     name: str
@@ -140,6 +144,7 @@ class SurfaceSpeed:
     nufft_upsampling: float | None
     memory_bytes: int | None
     notes: list[str]
+    planned: PlannedTable
     whole_run_s: float | None = None
     whole_run_fault: str = ""
 
@@ -165,6 +170,7 @@ class _Suite:
     def __init__(self, config: Config, field: HeightField, effort: Effort, progress: Progress) -> None:
         self._config, self._field, self._effort, self._progress = config, field, effort, progress
         self._truth = MapTruth(field, config, effort.map_size, progress)
+        self._mirrors = MirrorTruth(field, config, progress)
         self._main = setting.make(field, config, MAIN)
         self._points: list[Point] = []
         self._notes: list[str] = []
@@ -198,6 +204,7 @@ class _Suite:
             nufft_upsampling=found.upsampling if found else None,
             memory_bytes=memory.peak_bytes(self._field, self._config, MAIN) if effort.memory else None,
             notes=self._notes,
+            planned=highlight.planned(self._field, self._config, self._truth, self._mirrors.reference),
         )
 
     def _numpy(self, baked: TimedBake, samples: Array) -> tuple[float, RelativeError]:
@@ -261,7 +268,8 @@ class _Suite:
             stored, seconds = timed(store)
             settings, error = {**settings_of(MAIN), "textures": count}, self._truth.error(stored.textures)
             total = baked.stages.total + seconds
-            self._points.append(Point(TEXTURES, settings, self._main.plan.texels, total, stored.values.nbytes, error))
+            point = Point(TEXTURES, settings, self._main.plan.texels, total, stored.values.nbytes, error)
+            self._points.append(replace(point, mirror_error=self._mirrors.largest_error(stored.textures)))
         self._progress("textures", 1.0)
 
     def _paper(self) -> list[Timed]:

@@ -27,7 +27,7 @@ class MapTruth:
         reference = Reference(field, config.coherence.sigma_um, config.light.lambda_min_nm, progress)
         self._exact = reference.xyz(config.light, config.material, self._wi, self._wr, progress=progress)
 
-    def error(self, table: Table) -> ColourError:
-        """Return the CIELAB errors of a table's map at 7500 RU."""
+    def error(self, table: Table, exposure_ru: float = EXPOSURE_RU) -> ColourError:
+        """Return the CIELAB errors of a table's map at an exposure, RU."""
         found, unit = table_evaluator(table, self._radiometry)(self._wi, self._wr), self._radiometry.unit
-        return colour_error(found / unit, self._exact / unit, EXPOSURE_RU)
+        return colour_error(found / unit, self._exact / unit, exposure_ru)

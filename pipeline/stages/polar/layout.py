@@ -57,6 +57,7 @@ def _stored(config: Config, loss: dict[str, Any]) -> list[list[str]]:
         ["stored in", f"{config.publish.precision}, {loss['textures']} of {loss['most_textures']} textures"],
         ["mean ΔE that this adds", f"{loss['added']['mean']:.3g} at {loss['added']['exposure_ru']:g} RU"],
         ["mean ΔE in mirror directions at 1 RU", f"{mirror:.3g}: the highlight is {verdict}"],
+        ["largest error of Y there", f"{100.0 * loss['y_in_mirror']['maximum']:.2g} %"],
     ]
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import sqrt
 
 from pipeline import resources
-from pipeline.accuracy.checks import random_directions
+from pipeline.accuracy.checks import certified_directions, random_directions
 from pipeline.bundle.polar import storage
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction import power_spectrum as spectrum
@@ -48,7 +48,8 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
     freed_bytes += sum(tried.values()) + integral.weights_bytes
     is_whole = storage.is_whole(config)
     choosing = {"textures": storage.choosing_bytes(integral.table_bytes, bake.w_terms, config.publish)}
-    choosing |= reference.answering(random_directions(foreseen.places.count), foreseen.wavelengths, config.material)
+    random = random_directions(foreseen.places.count)
+    choosing |= reference.answering(random, foreseen.wavelengths, config.material)
     return LayoutSizes(
         transform=_transform(foreseen, bake, azimuths, chosen, integral, searched),
         table=_table(foreseen, integral, e_bytes, freed_bytes),
@@ -58,7 +59,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         study=_study(bake, rings, azimuths, metal=metal),
         textures=Need(
             {} if is_whole else choosing,
-            reference.seconds(2 * random_directions(foreseen.places.count), foreseen.wavelengths),
+            reference.seconds(random + certified_directions(foreseen.places.count), foreseen.wavelengths),
         ),
         # as stored in half floats, and as read back
         stored_bytes=0 if is_whole else 3 * integral.table_bytes // 2,
@@ -108,7 +109,7 @@ def _table(foreseen: Foreseen, integral: IntegralSize, e_bytes: int, freed_bytes
         {**holding, **reference.making(), **freed},
         {
             **holding,
-            **reference.answering(random_directions(foreseen.places.count), foreseen.wavelengths, config.material),
+            **reference.answering(certified_directions(foreseen.places.count), foreseen.wavelengths, config.material),
             **freed,
         },
         {**holding, **certified, "writing": saving_bytes(integral.table_bytes), **freed},
@@ -121,7 +122,7 @@ def _table(foreseen: Foreseen, integral: IntegralSize, e_bytes: int, freed_bytes
     )
     return Need(
         needed,
-        integral.seconds + reference.seconds(random_directions(foreseen.places.count), foreseen.wavelengths),
+        integral.seconds + reference.seconds(certified_directions(foreseen.places.count), foreseen.wavelengths),
         max(integral.table_bytes, integral.weights_bytes, reference.part_bytes),
     )
 

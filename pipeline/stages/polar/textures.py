@@ -20,7 +20,7 @@ from pipeline.stages.stage import (
     textures_work,
 )
 from pipeline.store import arrays
-from pipeline.tables.evaluate import Table
+from pipeline.tables.evaluate import Table, interpolator
 from pipeline.tables.polar.compression import Envelope, Textures, whole
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+    from pipeline.accuracy.checks import check_flank
     from pipeline.bundle.polar import storage
 
     certificate = inputs.summary("table")["certificate"]
@@ -59,6 +60,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     inputs.session.keep("textures", stored)
     measured = storage.mean_error(random, config)
     kept = measured <= config.budget_delta_e
+    flank = check_flank(interpolator(stored.textures, config.radiometry), reference, config)
     return {
         "loss": loss.model_dump(mode="json"),
         "certificate": {
@@ -66,6 +68,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "delta_e": config.budget_delta_e if kept else None,
             "measured": measured,
             "random": asdict(random),
+            "flank": None if flank is None else asdict(flank),
         },
     }
 
@@ -96,4 +99,4 @@ def _load(inputs: Inputs) -> "Stored":
     return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
 
 
-TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)
+TEXTURES = Stage("textures", 2, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

@@ -3,7 +3,7 @@
 from math import ceil
 
 from pipeline import resources
-from pipeline.accuracy.checks import RANDOM_DIRECTIONS
+from pipeline.accuracy.checks import certified_directions
 from pipeline.bundle.taylor import storage
 from pipeline.diffraction import dft_stack, expansion
 from pipeline.resources import Need, largest
@@ -13,6 +13,8 @@ from pipeline.store.arrays import saving_bytes
 from pipeline.tables.evaluate import look_up_bytes
 from pipeline.tables.taylor import table as taylor
 
+# of the window in the middle
+_CERTIFIED = certified_directions(1)
 # nodes of the tables and directions of the maps that `validate` computes for its curves
 _STUDIED_NODES = 5 * 201**2 // 2 + 12 * 2900
 # of the process in the stage "stack", measured as those of the stages that all layouts have
@@ -50,18 +52,18 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         {**holding, **building},
         {**holding, "writing": saving_bytes(table_bytes), **freed},
         {**holding, **reference.making(), **freed},
-        {**holding, **reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material), **freed},
+        {**holding, **reference.answering(_CERTIFIED, foreseen.wavelengths, config.material), **freed},
     )
     seconds = taylor.seconds(layout.resolution**2 // 2, wavelengths, terms, chosen)
     table = Need(
         needed,
-        seconds + reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths),
+        seconds + reference.seconds(_CERTIFIED, foreseen.wavelengths),
         max(building["stack on the device"], reference.part_bytes),
     )
     other = min(301, layout.resolution)
     study = {"stack": stack_bytes, **taylor.building_arrays(other, terms, chosen)}
     in_half = config.publish.precision == "half"
-    answering = reference.answering(RANDOM_DIRECTIONS, foreseen.wavelengths, config.material)
+    answering = reference.answering(_CERTIFIED, foreseen.wavelengths, config.material)
     storing = largest({"tables in half floats": storage.measuring_bytes(table_bytes)}, answering)
     return LayoutSizes(
         transform=transform,
@@ -70,7 +72,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         table_bytes=table_bytes,
         freed_bytes=freed_bytes + reference.part_bytes,
         study=Need(study, taylor.seconds(_STUDIED_NODES, wavelengths, terms, chosen)),
-        textures=Need(storing if in_half else {}, reference.seconds(RANDOM_DIRECTIONS, foreseen.wavelengths)),
+        textures=Need(storing if in_half else {}, reference.seconds(_CERTIFIED, foreseen.wavelengths)),
         stored_bytes=table_bytes if in_half else 0,
         prepared=Need({"images": storage.planes_bytes(layout.resolution)}),
     )
