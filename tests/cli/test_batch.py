@@ -2,11 +2,12 @@
 
 import re
 import subprocess
-from pathlib import Path
+from typing import Any
 
 import pytest
 
-from pipeline.stages import bundle
+from pipeline.config.models import Config
+from pipeline.stages import run
 from pipeline.store.store import Artifact
 from tests.cli.tool import REPOSITORY, Tool, recipe
 
@@ -61,18 +62,18 @@ def test_a_missed_budget_has_results_and_the_first_failure_given_decides_the_exi
     copy: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What goes wrong inside one config is a line, too."""
-    place = bundle.place
+    execute = run.execute
 
-    def placed(artifact: Artifact, out: Path) -> Path:
-        return place(artifact, out) if out.name != "z" else Path(f"{1 / 0}")
+    def executed(config: Config, *arguments: Any) -> dict[str, Artifact]:
+        return execute(config, *arguments) if config.name != "z" else {}[config.name]
 
-    monkeypatch.setattr(bundle, "place", placed)
+    monkeypatch.setattr(run, "execute", executed)
     strict = copy.config("strict.toml", name="strict", accuracy={"delta_e": 1e-3})
     broken = copy.config("z.toml", name="z")
     result = copy("run", broken, strict, "small.toml")
     assert result.code == 1
     fault, missed = result.errors
-    assert fault.startswith("error: z: internal fault, please report it: ZeroDivisionError: division by zero (")
+    assert fault.startswith("error: z: internal fault, please report it: KeyError: 'z' (")
     assert missed.startswith("error: strict: accuracy.delta_e asks for 0.001 at 7500 RU, measured ")
     verdicts = {row[0]: row for row in rows(result.stdout)}
     assert [verdicts[name][1] for name in ("z", "strict", "small")] == ["failed", "missed", "ok"]
@@ -95,6 +96,6 @@ def test_a_faulty_config_stops_all_before_any_work(tool: Tool) -> None:
 def test_make_pipeline_without_a_config_bakes_all() -> None:
     command = ["make", "-C", str(REPOSITORY), "-n", "pipeline"]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    (run,) = [line for line in printed.splitlines() if "diffract-bake run" in line]
+    (line,) = [line for line in printed.splitlines() if "diffract-bake run" in line]
     configs = sorted(path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "configs").glob("*.toml"))
-    assert run.split()[2:-2] == configs
+    assert line.split()[2:-2] == configs
