@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make bake                    set up, then bake configs/elaphe.toml into $(OUT)/elaphe"
-	@echo "make pipeline CONFIG=...     set up, then bake any config (several: CONFIG=\"a.toml b.toml\")"
+	@echo "make pipeline                set up, then bake all of configs/ (or CONFIG=\"a.toml b.toml\"); ends in one summary"
 	@echo "make bench                   measure run time against error of every algorithm: table, plots, verdicts"
 	@echo "make validation              compare every method with the literature's figures and theory: pages, verdicts"
 	@echo "make test                    set up, then run linters and every test"
@@ -82,12 +82,8 @@ glslang:
 bake: setup
 	$(BAKE) run configs/elaphe.toml --out $(OUT)
 
-pipeline: has-config setup
-	$(BAKE) run $(CONFIG) --out $(OUT)
-
-.PHONY: has-config
-has-config:
-	@test -n "$(CONFIG)" || { echo "error: name a config: make pipeline CONFIG=configs/blazed.toml" >&2; exit 2; }
+pipeline: setup
+	$(BAKE) run $(or $(CONFIG),$(sort $(wildcard configs/*.toml))) --out $(OUT)
 
 # the measured scans, where they lie next to the checkout; otherwise bench and validation use synthetic surfaces
 SCANS := $(if $(wildcard ../shared/data/snakes),tests/scans/elaphe_scan.toml tests/scans/xenopeltis_scan.toml configs/blazed.toml)

@@ -1,6 +1,5 @@
 """The `diffract-bake` command: finds subcommands, and turns errors into one line and an exit code."""
 
-import errno
 import importlib
 import os
 import sys
@@ -62,8 +61,6 @@ def cli() -> None:
 
 def main() -> None:
     """Runs the command and turns errors into exit codes."""
-    from pipeline.errors import BakeError
-
     # waiting BLAS threads sleep after 2^4 cycles: by default they spin for 2^26, on the cores of the kernels
     os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
     try:
@@ -75,51 +72,7 @@ def main() -> None:
     except click.ClickException as error:
         console.usage_error(error)
         sys.exit(2)
-    except BakeError as error:
-        for line in error.lines:
-            console.note(f"error: {line}")
-        sys.exit(error.exit_code)
-    except OSError as error:
-        sys.exit(_output_refused(error))
-    except MemoryError as error:
-        sys.exit(_out_of_memory(error))
     except Exception as error:
-        sys.exit(_internal_fault(error))
+        from cli import faults
 
-
-def _output_refused(error: OSError) -> int:
-    """Returns the exit code where stdout refuses output: the reader ended (as in `| head`), or the disk is full."""
-    from pipeline.errors import StorageError
-    from pipeline.store.store import FULL
-
-    if error.errno not in (errno.EPIPE, *FULL):
-        return _internal_fault(error)
-    if error.filename is not None:
-        console.note(f"error: {error.filename}: no space left to write; free some, or choose another folder")
-        return StorageError.exit_code
-    # otherwise the buffered rest would fail again at exit
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    if error.errno == errno.EPIPE:
-        return 0
-    console.note("error: stdout: no space left to write")
-    return StorageError.exit_code
-
-
-def _out_of_memory(error: MemoryError) -> int:
-    """Returns the exit code where memory ran out, in spite of the prediction or outside of a bake."""
-    from pipeline.errors import ResourceError
-
-    text = " ".join(str(error).split()) or "no more can be had"
-    console.note(
-        f"error: out of memory: {text}; free some, or use smaller settings: `diffract-bake plan` shows what each "
-        "stage needs"
-    )
-    return ResourceError.exit_code
-
-
-def _internal_fault(error: Exception) -> int:
-    if os.environ.get("DIFFRACT_BAKE_DEBUG"):
-        raise error
-    text = " ".join(f"{type(error).__name__}: {error}".split())
-    console.note(f"error: internal fault, please report it: {text} (DIFFRACT_BAKE_DEBUG=1 shows the whole traceback)")
-    return 1
+        sys.exit(faults.report(error))

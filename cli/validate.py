@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from cli import console
-from cli.bake import bake_all
+from cli.batch import bake_all
 
 
 @click.command("validate")

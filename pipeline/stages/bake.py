@@ -9,6 +9,7 @@ from typing import Any
 from pipeline.config.models import Config
 from pipeline.progress import Progress, silent
 from pipeline.stages import bundle, run
+from pipeline.stages.session import Session
 from pipeline.stages.validate import REPORT
 from pipeline.store import scratch
 from pipeline.store.store import Artifact, Store, writing
@@ -41,20 +42,30 @@ class Results:
 
 
 def validate(
-    config: Config, store: Store, folder: Path, progress: Progress = silent, on_step: OnStep | None = None
+    config: Config,
+    store: Store,
+    folder: Path,
+    progress: Progress = silent,
+    on_step: OnStep | None = None,
+    session: Session | None = None,
 ) -> Results:
     """Runs every stage except the bundle, and copies maps and report from the store into a folder.
 
     config: the config. store: the store of its artifacts. folder: of the results, made where it is missing.
-    progress: called with a step's name and its completed share, 0 to 1. on_step: as in `run.execute`.
+    progress: called with a step's name and its completed share, 0 to 1. on_step, session: as in `run.execute`.
     Returns the results; a missed budget raises nothing, see `Results.missed_budget`.
     Raises StorageError where a file cannot be written, and the errors of the stages.
     """
-    return _until("validate", config, store, folder, progress, on_step)
+    return _until("validate", config, store, folder, progress, on_step, session)
 
 
 def make(
-    config: Config, store: Store, folder: Path, progress: Progress = silent, on_step: OnStep | None = None
+    config: Config,
+    store: Store,
+    folder: Path,
+    progress: Progress = silent,
+    on_step: OnStep | None = None,
+    session: Session | None = None,
 ) -> tuple[Results, Path]:
     """Runs every stage, and copies maps, report and bundle from the store into a folder.
 
@@ -62,14 +73,20 @@ def make(
     Returns the results and the bundle's folder.
     Raises DamagedError as well, where `folder` already has a bundle of this name whose files have changed.
     """
-    results = _until("bundle", config, store, folder, progress, on_step)
+    results = _until("bundle", config, store, folder, progress, on_step, session)
     return results, bundle.place(store.open("bundle", results.artifacts["bundle"].key), folder)
 
 
 def _until(
-    stage: str, config: Config, store: Store, folder: Path, progress: Progress, on_step: OnStep | None
+    stage: str,
+    config: Config,
+    store: Store,
+    folder: Path,
+    progress: Progress,
+    on_step: OnStep | None,
+    session: Session | None,
 ) -> Results:
-    artifacts = run.execute(config, run.plan(config, store, stage), store, progress, on_step)
+    artifacts = run.execute(config, run.plan(config, store, stage), store, progress, on_step, session)
     return Results(config.name, artifacts, _lay_out(store, artifacts, folder))
 
 

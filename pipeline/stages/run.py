@@ -105,12 +105,14 @@ def execute(
     store: Store,
     progress: Progress = silent,
     on_step: Callable[[Step, float | None], None] | None = None,
+    session: Session | None = None,
 ) -> dict[str, Artifact]:
     """Runs the steps of a plan that are to do.
 
     config: the config of the plan. steps: the plan. store: where artifacts are read and written.
     progress: called with a step's name and its completed share, 0 to 1.
     on_step: called after each step with the seconds that it took, None where it was cached.
+    session: objects in memory, which the stages use and add to; None for none.
     Returns every step's artifact by stage; its record is checked, its files are not.
     Raises ResourceError where a step needs more memory than is allowed, DeviceError where a step needs a device and
     none works, and the errors of the stages and the store.
@@ -124,7 +126,7 @@ def execute(
         import_module("zarr")
         found.result()
     opened: dict[str, Artifact] = {}
-    session = Session()
+    shared = session or Session()
     for step in steps:
         name, seconds = step.stage.name, None
         require_memory(config, steps, store, default_device().largest_bytes if uses_device else None)
@@ -138,7 +140,7 @@ def execute(
                     for needed in set(step.stage.inputs) - set(opened):
                         opened[needed] = store.open(needed, keys[needed])
                     artifacts = {needed: opened[needed] for needed in step.stage.inputs}
-                    _make(config, step, Inputs(artifacts, session), store, progress)
+                    _make(config, step, Inputs(artifacts, shared, step.key), store, progress)
                     # its files were hashed when they were written, so they need no check
                     opened[name] = store.describe(name, step.key)
                     seconds = time.perf_counter() - started

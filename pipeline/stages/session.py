@@ -1,6 +1,6 @@
-"""Objects that the stages of one run share in memory, because reading them from disk takes longer than using them."""
+"""Objects that stages share in memory, because reading them from disk takes longer than using them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Protocol, TypeVar
 
 # a larger object is released after the stage that asks for it first, to leave its memory to the following stages
@@ -24,18 +24,22 @@ T = TypeVar("T", bound=Sized)
 
 
 class Session:
-    """The objects of one run of one config, by name."""
+    """The objects of a run, each by the address of the artifact that holds it, so that configs can share them."""
 
     def __init__(self) -> None:
         self._objects: dict[str, Any] = {}
 
-    def keep(self, name: str, value: Sized) -> None:
-        """Keeps an object under a name, for the following stages."""
-        self._objects[name] = value
+    def keep(self, address: str, value: Sized) -> None:
+        """Keeps the object of an artifact, for the following stages."""
+        self._objects[address] = value
 
-    def get(self, name: str, make: Callable[[], T]) -> T:
-        """Returns the object of a name, or makes it; an object above 256 MiB is not kept for the next call."""
-        value: T = self._objects.pop(name) if name in self._objects else make()
+    def get(self, address: str, make: Callable[[], T]) -> T:
+        """Returns the object of an artifact, or makes it; an object above 256 MiB is not kept for the next call."""
+        value: T = self._objects.pop(address) if address in self._objects else make()
         if value.nbytes <= _KEPT_BYTES:
-            self._objects[name] = value
+            self._objects[address] = value
         return value
+
+    def retain(self, addresses: Collection[str]) -> None:
+        """Drops all objects but those of some artifacts."""
+        self._objects = {address: value for address, value in self._objects.items() if address in addresses}

@@ -3,27 +3,41 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from kernels import source
 from pipeline.config.models import Config
 from pipeline.progress import Progress
-from pipeline.stages.session import Session
+from pipeline.stages.session import Session, Sized
 from pipeline.store import digest
 from pipeline.store.store import Artifact
 
 Summary = dict[str, Any]
+_T = TypeVar("_T", bound=Sized)
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """The artifacts that a stage reads, by stage, and the objects that the stages of this run share."""
+    """The input of a stage.
+
+    artifacts: those that it reads, by stage. session: the objects that the stages of this run share.
+    address: of the artifact that it makes.
+    """
 
     artifacts: Mapping[str, Artifact]
     session: Session = field(default_factory=Session)
+    address: str = ""
 
     def __getitem__(self, stage: str) -> Artifact:
         return self.artifacts[stage]
+
+    def keep(self, value: Sized) -> None:
+        """Keeps the object that this stage writes, for the following stages."""
+        self.session.keep(self.address, value)
+
+    def shared(self, stage: str, load: Callable[[Artifact], _T]) -> _T:
+        """Returns the object in a stage's artifact: from memory, or loaded where it is not there."""
+        return self.session.get(self[stage].key, lambda: load(self[stage]))
 
     def summary(self, stage: str) -> Summary:
         """Returns the summary in the record of a stage's artifact."""

@@ -163,12 +163,15 @@ def _warnings(statistics: SurfaceStatistics, sigma_um: float, lambda_min_nm: flo
 
 def of(inputs: Inputs) -> HeightField:
     """Returns the height field of a stage's inputs."""
-    return inputs.session.get("height field", lambda: load(inputs["surface"]))
+    return inputs.shared("surface", load)
 
 
 def reference_of(config: Config, inputs: Inputs, progress: Progress) -> Reference:
     """Returns the exact reference of the height field, which the stages table, validate and bundle share."""
-    return inputs.session.get("reference", lambda: exact.reference_of(of(inputs), config, progress))
+    # it has no artifact, so that a session drops it before the next config, whose first stages are not predicted to
+    # hold it
+    address = f"reference of {inputs['surface'].key}"
+    return inputs.session.get(address, lambda: exact.reference_of(of(inputs), config, progress))
 
 
 def load(artifact: Artifact) -> HeightField:

@@ -21,13 +21,3 @@ def test_every_config_bakes(tool: Tool, published: Path, path: Path) -> None:
     report = (tool.out / name / "report.html").read_text(encoding="utf-8")
     assert f"<title>{name}</title>" in report
     assert tool("verify", tool.bundle(name)).code == 0
-
-
-@pytest.mark.slow
-def test_several_configs_bake_in_one_command(copy: Tool) -> None:
-    """In their order; the second is the first under another name."""
-    result = copy("run", "small.toml", copy.config("other.toml", name="other"), "--json")
-    assert result.code == 0, result.stderr
-    assert [printed["name"] for printed in result.json] == ["small", "other"]
-    for name in ("small", "other"):
-        assert copy("verify", copy.bundle(name)).code == 0

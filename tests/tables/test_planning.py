@@ -5,10 +5,13 @@ import pytest
 
 from pipeline.diffraction import power_spectrum
 from pipeline.optics import geometry
+from pipeline.optics.light import LaserLine, Light
 from pipeline.stages.polar import certificate
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
+from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.planning import anisotropy as scattering
+from pipeline.tables.polar.planning import plan
 from tests.tables.planned import SIGMA, config, exact_of, planned
 
 pytestmark = pytest.mark.slow
@@ -27,6 +30,19 @@ def test_numbers_that_a_config_sets_are_kept() -> None:
     assert chosen.terms == 20
     assert chosen.probed_delta_e is None
     assert table.values.shape == (20, 3, 4, 160)
+
+
+@pytest.mark.parametrize("lights", [("D65", "A"), (LaserLine(lambda_nm=532.0),) * 2])
+def test_a_plan_serves_every_illuminant_and_observer(lights: tuple[str | LaserLine, str | LaserLine]) -> None:
+    """One power spectrum is made for all of them, so the planner reads none of a config's."""
+    observers = ("CIE 1931 2 Degree Standard Observer", "CIE 1964 10 Degree Standard Observer")
+    found = [
+        plan.numbers(
+            0.1, SIGMA, Light(illuminant=light, observer=seen), None, plan.Budget(0.1, 7500.0), PolarLayout()
+        )
+        for light, seen in zip(lights, observers, strict=True)
+    ]
+    assert found[0] == found[1]
 
 
 def test_one_number_is_kept_while_the_other_is_searched() -> None:

@@ -81,7 +81,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "band_per_um": list(built.band_per_um),
         },
     )
-    inputs.session.keep("power spectrum", built)
+    inputs.keep(built)
     return {
         **asdict(chosen),
         "radii": len(built.radius_per_um),
@@ -105,7 +105,7 @@ def plan_in(summary: Summary) -> plan.Plan:
 
 def of(inputs: Inputs) -> power_spectrum.PolarPowerSpectrum:
     """Returns the power spectrum of a stage's inputs."""
-    return inputs.session.get("power spectrum", lambda: load(inputs["power_spectrum"]))
+    return inputs.shared("power_spectrum", load)
 
 
 def load(artifact: Artifact) -> power_spectrum.PolarPowerSpectrum:
@@ -126,4 +126,4 @@ def _work(config: Config) -> str:
     return f"a grid for a mean dE of {config.budget_delta_e:g}"
 
 
-POWER_SPECTRUM = Stage("power_spectrum", 5, ("surface",), _parameters, _produce, uses_device=True, work=_work)
+POWER_SPECTRUM = Stage("power_spectrum", 6, ("surface",), _parameters, _produce, uses_device=True, work=_work)

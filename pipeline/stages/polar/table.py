@@ -55,7 +55,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "channels": ["X", "Y", "Z"],
         },
     )
-    inputs.session.keep("table", table)
+    inputs.keep(table)
     return {
         "layout": "polar",
         "rings": asdict(table.grid.rings),
@@ -72,7 +72,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 def of(inputs: Inputs) -> polar.PolarTable:
     """Returns the table of a stage's inputs."""
-    return inputs.session.get("table", lambda: load(inputs["table"]))
+    return inputs.shared("table", load)
 
 
 def load(artifact: Artifact) -> polar.PolarTable:

@@ -57,7 +57,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         },
         {"envelope": asdict(stored.textures.envelope)},
     )
-    inputs.session.keep("textures", stored)
+    inputs.keep(stored)
     measured = storage.mean_error(random, config)
     kept = measured <= config.budget_delta_e
     flank = check_flank(interpolator(stored.textures, config.radiometry), reference, config)
@@ -79,7 +79,7 @@ def of(inputs: Inputs) -> "Stored":
 
     if inputs.summary("textures")["loss"] is None:
         return storage.store(whole(table.of(inputs)), "float")
-    return inputs.session.get("textures", lambda: _load(inputs))
+    return inputs.shared("textures", lambda _: _load(inputs))
 
 
 def table_of(inputs: Inputs) -> Table:

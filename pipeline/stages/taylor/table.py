@@ -51,7 +51,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     inside = np.hypot(nodes[:, None], nodes) <= grid.U_MAX
     interpolate = interpolator(table, config.radiometry)
     certified = certificate.measure(interpolate, surface.reference_of(config, inputs, progress), config, progress)
-    inputs.session.keep("table", table)
+    inputs.keep(table)
     return {
         "layout": "taylor",
         "resolution": table.resolution,
@@ -66,7 +66,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
 
 def of(inputs: Inputs) -> taylor.TaylorTable:
     """Returns the table of a stage's inputs."""
-    return inputs.session.get("table", lambda: load(inputs["table"]))
+    return inputs.shared("table", load)
 
 
 def load(artifact: Artifact) -> taylor.TaylorTable:

@@ -42,7 +42,7 @@ def _produce(config: Config, inputs: Inputs, _folder: Path, progress: Progress) 
     rounded = storage.in_half(baked, scale)
     reference = surface.reference_of(config, inputs, progress)
     certified = certificate.measure(interpolator(rounded, config.radiometry), reference, config, progress)
-    inputs.session.keep("textures", rounded)
+    inputs.keep(rounded)
     return {"loss": loss.model_dump(mode="json"), "certificate": asdict(certified)}
 
 
@@ -53,7 +53,7 @@ def table_of(inputs: Inputs) -> TaylorTable:
         return baked
     from pipeline.bundle.taylor import storage
 
-    return inputs.session.get("textures", lambda: storage.in_half(baked, storage.scales(baked, "half")))
+    return inputs.shared("textures", lambda _: storage.in_half(baked, storage.scales(baked, "half")))
 
 
 TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

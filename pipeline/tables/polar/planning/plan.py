@@ -162,9 +162,12 @@ def _w_terms(phase: float, light: Light, budget: Budget) -> int:
 
 
 def _probing_light(light: Light, layout: PolarLayout) -> Light:
-    """Chooses the light for planning: E serves all illuminants, so equal energy over the range, or a laser line."""
+    """Chooses the light for planning: equal energy over the range, or a laser line, and the standard observer.
+
+    E serves all illuminants and observers, so the plan depends on none of a config's.
+    """
     if light.is_line:
-        return light
+        return Light(illuminant=light.illuminant)
     if layout.form == "spectral":
         return Light(illuminant=LaserLine(lambda_nm=light.middle_nm))
     return Light(illuminant="E", range_nm=light.range_nm)

@@ -1,0 +1,1 @@
+"""Several configs in one run."""

@@ -1,0 +1,45 @@
+"""The order in which several configs are baked, and the objects that they share in memory."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pipeline.config.models import Config
+from pipeline.stages import run
+from pipeline.stages.session import Session
+from pipeline.store.store import Store
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A config when it is to be baked.
+
+    config: the config. number: its place in the order, from 1. count: of all configs.
+    session: the objects of the configs before it, of artifacts that it needs as well.
+    """
+
+    config: Config
+    number: int
+    count: int
+    session: Session
+
+
+def turns(configs: Sequence[Config], store: Store, until: str = "bundle") -> Iterator[Turn]:
+    """Yields configs in an order in which those that share artifacts follow each other.
+
+    Configs follow by name, except that those of one surface follow its first config, those of the same power spectrum
+    or stack the first of these, and so on through the stages. The addresses of a stage's inputs are part of its own
+    address, so a config shares nothing with those before that it does not share with the one right before. Objects
+    that a config does not need are dropped when its turn comes: no stage holds more than in a run of one config.
+
+    configs: of different names, in any order. store: the store of artifacts. until: name of the last stage.
+    """
+    addresses = {config.name: [step.key for step in run.plan(config, store, until)] for config in configs}
+    first: dict[str, str] = {}
+    for name in sorted(addresses):
+        for address in addresses[name]:
+            first.setdefault(address, name)
+    ordered = sorted(configs, key=lambda config: [*(first[a] for a in addresses[config.name]), config.name])
+    session = Session()
+    for number, config in enumerate(ordered, 1):
+        session.retain(addresses[config.name])
+        yield Turn(config, number, len(ordered), session)

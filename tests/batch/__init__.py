@@ -1,0 +1,1 @@
+"""Tests of several configs in one run."""
