@@ -12,7 +12,7 @@ from pipeline.stages.stage import Inputs
 Rows = list[list[str]]
 
 
-ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max", "place of the largest")
+ERROR_COLUMNS = ("where", "RU", "mean", "99th %", "max", "place of max")
 
 
 def error_rows(results: dict[str, Any]) -> Rows:
@@ -28,7 +28,7 @@ def error_rows(results: dict[str, Any]) -> Rows:
     ]
     sets += [("random directions", e, "") for e in results["random"]["colour"]]
     if (flank := results["flank"]) is not None:
-        name = f"within {flank['lobe_widths']:g} lobe widths of mirrors"
+        name = f"within {flank['lobe_widths']:g} widths of mirrors"
         sets.append((name, flank["colour"], _place(flank["largest"])))
     return [
         [name, f"{e['exposure_ru']:g}", *(f"{e[key]:.3f}" for key in ("mean", "percentile_99", "maximum")), place]
@@ -37,10 +37,11 @@ def error_rows(results: dict[str, Any]) -> Rows:
 
 
 def _place(largest: dict[str, Any]) -> str:
-    """Says where an error is the largest, and why."""
+    """Says where an error is the largest: on what, and how many widths of the specular lobe from the mirror."""
     if not largest["delta_e"]:
         return ""
-    return f"{largest['reason']}, {largest['lobe_widths']:.1f} lobe widths from the mirror"
+    on = largest["reason"].partition(" ")[0]
+    return f"{on}, {largest['lobe_widths']:.1f} widths"
 
 
 def _surface_rows(summary: dict[str, Any]) -> Rows:

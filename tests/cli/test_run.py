@@ -43,11 +43,11 @@ def test_tells_errors_and_files_on_stdout_and_work_on_stderr(first_run: tuple[To
     tool, result = first_run
     table, paths = result.stdout.split("out/small/", 1)
     assert table.splitlines()[0].startswith("small: CIELAB error")
-    assert table.splitlines()[1].split() == ["where", "RU", "mean", "99th", "%", "max"]
+    assert table.splitlines()[1].split() == ["where", "RU", "mean", "99th", "%", "max", "place", "of", "max"]
     assert too_wide(table) == []
     for name in ("map_theta0_phi0.exr", "map_theta0_phi0.png", "report.html", tool.bundle().name):
         assert name in paths
-    assert len(result.stdout.splitlines()) == 2 + 6 + 4
+    assert len(result.stdout.splitlines()) == 2 + 7 + 4
     lines = result.stderr.splitlines()
     assert lines[0] == "small:"
     for stage in STAGES:
