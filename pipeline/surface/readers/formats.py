@@ -61,7 +61,7 @@ READ = (
     Format("lext", "Olympus LEXT", (".lext",), LIBRARY, tried=False),
     Format("oir", "Olympus .oir", (".oir",), LIBRARY, tried=False),
     Format("poir", "Olympus .poir", (".poir",), LIBRARY, tried=False),
-    Format("nmm", "nano measuring machine .zip", (".zip",), LIBRARY, tried=False),
+    Format("nmm", "nano measuring machine .zip", (".zip",), LIBRARY),
     Format("nc", "NetCDF", (".nc",), LIBRARY),
     Format("mat", "MATLAB .mat", (".mat",), LIBRARY),
     Format("h5", "HDF5", (".h5", ".hdf5"), LIBRARY),
