@@ -1,17 +1,21 @@
 """Formats that are containers of other files, written by the tests from their layouts: orientation, units, voids."""
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.errors import InputError
 from pipeline.surface.readers import read_scan
-from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, check, packed
+from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, VOID, check, packed
 
 pytestmark = pytest.mark.usefixtures("surface_topography")
 
 DASHES = "-" * 42
+# picometres along x and y, and per count of height
+STEPS = (100_000, 200_000, 1000)
 
 
 def nmm() -> bytes:
@@ -31,9 +35,54 @@ def nmm() -> bytes:
     return packed({name: text.encode() for name, text in members.items()})
 
 
+def directory(start: int, entries: dict[int, tuple[int, bytes]], following: int = 0) -> bytes:
+    """One directory of a TIFF at the offset `start`: tag -> (type, value); the next one lies `following` bytes on."""
+    behind, head, values = start + 6 + 12 * len(entries), struct.pack("<H", len(entries)), b""
+    for tag, (kind, value) in sorted(entries.items()):
+        count = len(value) // {2: 1, 3: 2, 4: 4}[kind]
+        place = value.ljust(4, b"\0") if len(value) <= 4 else struct.pack("<I", behind + len(values))
+        values += value + b"\0" * (len(value) % 2) if len(value) > 4 else b""
+        head += struct.pack("<HHI", tag, kind, count) + place
+    return head + struct.pack("<I", behind + len(values) + following if following else 0) + values
+
+
+def image(description: str, pixels: bytes, bits: int, photometric: int, start: int) -> dict[int, tuple[int, bytes]]:
+    """The entries of a page of one uncompressed strip at the offset `start`."""
+    short = {256: NX, 257: NY, 258: bits, 259: 1, 262: photometric, 277: 1, 278: NY}
+    long = {273: start, 279: len(pixels)}
+    entries = {tag: (3, struct.pack("<H", value)) for tag, value in short.items()}
+    entries |= {tag: (4, struct.pack("<I", value)) for tag, value in long.items()}
+    return entries | {270: (2, description.encode() + b"\0")}
+
+
+def lext(invalid: bool = True) -> bytes:
+    """Olympus LEXT: a TIFF with pages for intensity, height and invalid samples; numbers are 1e-6 um and 1e-6."""
+    axes = "".join(f"<HeightDataPerPixel{a}>{pm}</HeightDataPerPixel{a}>" for a, pm in zip("XYZ", STEPS, strict=True))
+    units = "".join(f"<HeightDataUnit{axis}>1</HeightDataUnit{axis}>" for axis in "XYZ")
+    factors = "".join(f"<MakerCalibrationValue{axis}>1000000</MakerCalibrationValue{axis}>" for axis in "XYZ")
+    told = f"<TiffTagDescData><HeightInfo>{axes}{units}</HeightInfo></TiffTagDescData>"
+    settings = f"<ExifTagDescData><ImageCommonSettingsInfo>{factors}</ImageCommonSettingsInfo></ExifTagDescData>"
+    void = np.zeros((NY, NX), bool)
+    void[VOID] = True
+    heights = TOP_FIRST.astype("<u2").tobytes()
+    pages = [(told, heights, 16, 1), ("HEIGHT", heights, 16, 1)]
+    pages += [("INVALID", np.packbits(void, axis=1).tobytes(), 1, 4)] if invalid else []
+    data = struct.pack("<2sHI", b"II", 42, 0)
+    data += directory(len(data), {0xA40B: (2, settings.encode() + b"\0")})
+    data = data[:4] + struct.pack("<I", len(data) + len(heights)) + data[8:]
+    for i, (name, pixels, bits, photometric) in enumerate(pages):
+        entries = image(name, pixels, bits, photometric, len(data))
+        entries |= {0x8769: (4, struct.pack("<I", 8))} if i == 0 else {}
+        data += pixels
+        data += directory(len(data), entries, len(pages[i + 1][1]) if i + 1 < len(pages) else 0)
+    return data
+
+
 # name -> (content, void, micrometres per unit of TOP_FIRST)
 FILES: dict[str, tuple[Callable[[], bytes], bool, float]] = {
     "a.zip": (nmm, False, 1e-3),
+    "a.lext": (lext, True, 1e-3),
+    "measured.lext": (lambda: lext(invalid=False), False, 1e-3),
 }
 
 

@@ -58,7 +58,7 @@ READ = (
     Format("vk", "Keyence .vk3/.vk4/.vk6/.vk7", (".vk3", ".vk4", ".vk6", ".vk7"), LIBRARY),
     Format("zon", "Keyence .zon", (".zon",), LIBRARY),
     Format("zmg", "KLA Zeta .zmg", (".zmg",), LIBRARY),
-    Format("lext", "Olympus LEXT", (".lext",), LIBRARY, tried=False),
+    Format("lext", "Olympus LEXT", (".lext",), LIBRARY),
     Format("oir", "Olympus .oir", (".oir",), LIBRARY, tried=False),
     Format("poir", "Olympus .poir", (".poir",), LIBRARY, tried=False),
     Format("nmm", "nano measuring machine .zip", (".zip",), LIBRARY),

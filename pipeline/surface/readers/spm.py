@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.surface.readers import igor, nanoscope
+from pipeline.surface.readers import igor, nanoscope, olympus
 from pipeline.surface.readers.common import (
     EXPORT,
     fault,
@@ -77,6 +77,8 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
         heights = _heights(stored, key)
         if key == "nms":
             heights[_end_codes(heights, _notes(chosen))] = np.nan
+        if key in olympus.KEYS:
+            heights[olympus.not_measured(path, key, chosen)[::-1]] = np.nan
         steps = _steps(path, key, chosen)
         pitch = None if steps is None or unit is None else (steps[0] * unit, steps[1] * unit)
         form = ", ".join((BY_LIBRARY[key], *_direction(chosen)))
