@@ -57,9 +57,9 @@ def image(description: str, pixels: bytes, bits: int, photometric: int, start: i
 
 def lext(invalid: bool = True) -> bytes:
     """Olympus LEXT: a TIFF with pages for intensity, height and invalid samples; numbers are 1e-6 um and 1e-6."""
-    axes = "".join(f"<HeightDataPerPixel{a}>{pm}</HeightDataPerPixel{a}>" for a, pm in zip("XYZ", STEPS, strict=True))
+    axes = "".join(f"<HeightDataPerPixel{a}>{pm / 2}</HeightDataPerPixel{a}>" for a, pm in zip("XYZ", STEPS, strict=True))
     units = "".join(f"<HeightDataUnit{axis}>1</HeightDataUnit{axis}>" for axis in "XYZ")
-    factors = "".join(f"<MakerCalibrationValue{axis}>1000000</MakerCalibrationValue{axis}>" for axis in "XYZ")
+    factors = "".join(f"<MakerCalibrationValue{axis}>2000000</MakerCalibrationValue{axis}>" for axis in "XYZ")
     told = f"<TiffTagDescData><HeightInfo>{axes}{units}</HeightInfo></TiffTagDescData>"
     settings = f"<ExifTagDescData><ImageCommonSettingsInfo>{factors}</ImageCommonSettingsInfo></ExifTagDescData>"
     void = np.zeros((NY, NX), bool)
@@ -78,11 +78,66 @@ def lext(invalid: bool = True) -> bytes:
     return data
 
 
+def oir(invalid: bool = True) -> bytes:
+    """Olympus OIR: XML that describes the channels, and a block of codes for each, the top line first."""
+
+    def text(data: str) -> bytes:
+        return struct.pack("<I", len(data)) + data.encode()
+
+    def block(kind: int, data: bytes) -> bytes:
+        return struct.pack("<9I", kind, 1, 1, 0, 0, 1, 1, 1, 1) + data
+
+    def xml(name: str, *inside: str) -> str:
+        return f"<{name}>{''.join(inside)}</{name}>"
+
+    def axes(space: str, *values: object) -> str:
+        return "".join(xml(f"{space}:{axis}", str(value)) for axis, value in zip("xyz", values, strict=True))
+
+    factors = (2.0, 0.5, 4.0)
+    lengths = [1e-6 * picometres / factor for picometres, factor in zip(STEPS, factors, strict=True)]
+    pitch = xml("commonphase:length", axes("commonparam", *lengths))
+    pitch += xml("commonphase:pixelUnit", axes("commonphase", *["MICRO_METER"] * 3))
+    void = np.zeros((NY, NX), "<u2")
+    void[VOID] = 1
+    images = {"INTENSITY": np.zeros((NY, NX), "<u2"), "HEIGHT": TOP_FIRST.astype("<u2")}
+    images |= {"INVALID": void} if invalid else {}
+    channels = ""
+    for name in images:
+        kind = xml("commonphase:imageType", name) + xml("commonphase:depth", "2")
+        channels += f'<commonphase:channel id="{name.lower()}">{pitch}'
+        channels += xml("commonphase:imageDefinition", kind) + "</commonphase:channel>"
+    phase = xml("commonimage:phase", xml("commonphase:group", channels))
+    info = xml("commonimage:imageInfo", xml("commonimage:width", str(NX)), xml("commonimage:height", str(NY)), phase)
+    calibration = xml("commonimage:pixelCalibration", axes("commonparam", *factors))
+    more = xml("commonimage:general", xml("base:creationDateTime", "2020-01-01"))
+    more += xml("commonimage:microscope", xml("base:name", "OLS5000"))
+    more += xml("commonimage:acquisition", xml("commonimage:microscopeConfiguration", calibration))
+    listed = block(2, text(xml("lsmimage:imageProperties", more, info)))
+    listed += block(6, struct.pack("<I", 1) + text("t001_0_1") + struct.pack("<I", 0))
+    listed += block(8, struct.pack("<I", len(images)) + b"".join(text(name.lower()) + b"\0" * 4 for name in images))
+    data = b"OLYMPUSRAWFORMAT" + struct.pack("<14I", 12, 0, 1, 2, 0, 0, 0, 0, 17, 0, 1, 0, 0, 0)
+    data += b"UNKNOWN\0" + struct.pack("<4I", 1, 1, 0xFFFFFFFF, 0xFFFFFFFF)
+    data += struct.pack("<ii", len(listed), 0) + listed
+    for name, codes in images.items():
+        head = struct.pack("<II", 0, codes.nbytes) + text(f"t001_0_1_{name.lower()}_0")
+        data += struct.pack("<ii", len(head), 3) + head + struct.pack("<II", codes.nbytes, 4) + codes.tobytes()
+    return data + struct.pack("<i", -1)
+
+
+def poir() -> bytes:
+    """Olympus POIR: a zip of OIR files, of which that of the camera has no heights."""
+    camera = oir().replace(b"lsmimage:imageProperties", b"camimage:imageProperties")
+    return packed({"Camera.oir": camera, "LSM.oir": oir()})
+
+
 # name -> (content, void, micrometres per unit of TOP_FIRST)
 FILES: dict[str, tuple[Callable[[], bytes], bool, float]] = {
     "a.zip": (nmm, False, 1e-3),
     "a.lext": (lext, True, 1e-3),
     "measured.lext": (lambda: lext(invalid=False), False, 1e-3),
+    "a.oir": (oir, True, 1e-3),
+    "measured.oir": (lambda: oir(invalid=False), False, 1e-3),
+    "a.poir": (poir, True, 1e-3),
 }
 
 
