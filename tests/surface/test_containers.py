@@ -1,11 +1,14 @@
 """Formats that are containers of other files, written by the tests from their layouts: orientation, units, voids."""
 
 import struct
+import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from pipeline.errors import InputError
 from pipeline.surface.readers import read_scan
@@ -57,10 +60,12 @@ def image(description: str, pixels: bytes, bits: int, photometric: int, start: i
 
 def lext(invalid: bool = True) -> bytes:
     """Olympus LEXT: a TIFF with pages for intensity, height and invalid samples; numbers are 1e-6 um and 1e-6."""
-    axes = "".join(f"<HeightDataPerPixel{a}>{pm / 2}</HeightDataPerPixel{a}>" for a, pm in zip("XYZ", STEPS, strict=True))
-    units = "".join(f"<HeightDataUnit{axis}>1</HeightDataUnit{axis}>" for axis in "XYZ")
-    factors = "".join(f"<MakerCalibrationValue{axis}>2000000</MakerCalibrationValue{axis}>" for axis in "XYZ")
-    told = f"<TiffTagDescData><HeightInfo>{axes}{units}</HeightInfo></TiffTagDescData>"
+    axes, factors = "", ""
+    for axis, picometres in zip("XYZ", STEPS, strict=True):
+        axes += f"<HeightDataPerPixel{axis}>{picometres / 2}</HeightDataPerPixel{axis}>"
+        axes += f"<HeightDataUnit{axis}>1</HeightDataUnit{axis}>"
+        factors += f"<MakerCalibrationValue{axis}>2000000</MakerCalibrationValue{axis}>"
+    told = f"<TiffTagDescData><HeightInfo>{axes}</HeightInfo></TiffTagDescData>"
     settings = f"<ExifTagDescData><ImageCommonSettingsInfo>{factors}</ImageCommonSettingsInfo></ExifTagDescData>"
     void = np.zeros((NY, NX), bool)
     void[VOID] = True
@@ -130,6 +135,70 @@ def poir() -> bytes:
     return packed({"Camera.oir": camera, "LSM.oir": oir()})
 
 
+def ole(name: str, stream: bytes) -> bytes:
+    """An OLE compound file of one stream of 4096 bytes or more: header, one sector of the FAT, folder, data."""
+    n, end, free = -(-len(stream) // 512), 0xFFFFFFFE, 0xFFFFFFFF
+    header = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 16
+    header += struct.pack("<5H6x", 0x3E, 3, 0xFFFE, 9, 6) + struct.pack("<9I", 0, 1, 1, 0, 4096, end, 0, end, 0)
+    header += struct.pack("<109I", 0, *[free] * 108)
+    fat = [0xFFFFFFFD, end, *range(3, n + 2), end]
+
+    def entry(text: str, kind: int, child: int, start: int, size: int) -> bytes:
+        encoded = text.encode("utf-16-le")
+        head = encoded.ljust(64, b"\0") + struct.pack("<HBB3I", len(encoded) + 2, kind, 1, free, free, child)
+        return head + b"\0" * 36 + struct.pack("<IQ", start, size)
+
+    folder = entry("Root Entry", 5, 1, end, 0) + entry(name, 2, free, 2, len(stream))
+    table = struct.pack("<128I", *fat, *[free] * (128 - len(fat)))
+    return header + table + folder.ljust(512, b"\0") + stream.ljust(512 * n, b"\0")
+
+
+def mnt(masked: bool = True) -> bytes:
+    """Digital Surf Mountains: an OLE file with a tree of tags; counts and mask in compressed blocks."""
+
+    def box(tag: int, *inside: bytes) -> bytes:
+        data = b"".join(inside)
+        return struct.pack("<HQ", tag, len(data)) + data
+
+    def number(tag: int, form: str, value: float) -> bytes:
+        return box(tag, struct.pack(f"<{form}", value))
+
+    def text(tag: int, value: str) -> bytes:
+        return box(tag, b"\4" + value.encode("utf-16-le"))
+
+    def kind(value: int) -> bytes:
+        return box(1, number(1, "I", value))
+
+    def array(tag: int, of: int, stored: NDArray[Any]) -> bytes:
+        # the second half of the samples comes first
+        flat, half = stored.ravel(), stored.size // 2
+        blocks = struct.pack("<Q", stored.nbytes)
+        for first, part in ((half, flat[half:]), (0, flat[:half])):
+            compressed = zlib.compress(part.tobytes())
+            blocks += struct.pack("<QII", first, part.size, len(compressed)) + compressed
+        return box(tag, kind(of), box(2, number(1, "I", stored.size), box(2, blocks)))
+
+    def scale(step: float, unit: str, shown: str, origin: float) -> bytes:
+        return box(0xFFFF, number(1, "d", step), text(2, unit), text(3, shown), number(5, "d", origin))
+
+    def axis(tag: int, step: float, n: int) -> bytes:
+        return box(tag, box(0xFFFF, scale(step, "m", "mm", 0), number(1, "I", n)))
+
+    mask = np.full((NY + 2, NX + 2), 22, "u1")
+    mask[1:-1, 1:-1] = 9
+    mask[1 + VOID[0], 1 + VOID[1]] = 22
+    picture = box(2, number(1, "I", NX), number(2, "I", NY), array(5, 9048, mask))
+    grid = axis(1, 1e-12 * STEPS[0], NX) + axis(2, 1e-12 * STEPS[1], NY)
+    grid += box(3, kind(9056), picture) if masked else b""
+    heights = array(1, 9049, TOP_FIRST.astype("<i4")) + box(2, scale(1e-12 * STEPS[2], "m", "\u00b5m", 5))
+    measured = box(0xFFFF, box(0xFFFF, grid), heights)
+    surface = kind(9012) + box(2, box(1, kind(9062), box(2, measured)))
+    objects = struct.pack("<Q", 0) + box(1, surface)
+    # settings of the page, which are skipped, make the stream long enough
+    contents = box(1, box(0x7FFF, b"\0" * 4096), box(0x2BD, box(2, box(1, objects))))
+    return ole("ScopedContents", struct.pack("<Q", len(contents)) + contents)
+
+
 # name -> (content, void, micrometres per unit of TOP_FIRST)
 FILES: dict[str, tuple[Callable[[], bytes], bool, float]] = {
     "a.zip": (nmm, False, 1e-3),
@@ -138,6 +207,8 @@ FILES: dict[str, tuple[Callable[[], bytes], bool, float]] = {
     "a.oir": (oir, True, 1e-3),
     "measured.oir": (lambda: oir(invalid=False), False, 1e-3),
     "a.poir": (poir, True, 1e-3),
+    "a.mnt": (mnt, True, 1e-3),
+    "measured.mnt": (lambda: mnt(masked=False), False, 1e-3),
 }
 
 
@@ -149,7 +220,7 @@ def test_file(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize("kept", [0.97, 0.5])
+@pytest.mark.parametrize("kept", [0.9, 0.5])
 def test_a_cut_file_is_one_line(tmp_path: Path, name: str, kept: float) -> None:
     data = FILES[name][0]()
     (tmp_path / name).write_bytes(data[: int(kept * len(data))])
