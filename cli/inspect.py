@@ -60,8 +60,7 @@ def _print_formats(as_json: bool) -> None:
         console.print_json([asdict(entry) for entry in READ])
         return
     for entry in READ:
-        doubt = "" if entry.tried else ", not tried with a file"
-        console.say(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}{doubt}")
+        console.say(f"{entry.name:<32} {' '.join(entry.suffixes):<28} {entry.reader}")
 
 
 def _schema(document: str) -> dict[str, Any]:

@@ -1,9 +1,14 @@
 """A height field that looks the same under no flip or turn, for files of many formats."""
 
+import io
+import zipfile
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
+
+from pipeline.surface.scan import Scan
 
 NY, NX = 10, 12
 # top row first; nothing looks the same when it is flipped or turned
@@ -20,3 +25,21 @@ def with_void(value: float, dtype: str) -> NDArray[Any]:
 
 def padded(text: str, length: int) -> bytes:
     return text.encode().ljust(length, b"\0")[:length]
+
+
+def packed(members: dict[str, bytes]) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        for member, data in members.items():
+            archive.writestr(member, data)
+    return file.getvalue()
+
+
+def check(scan: Scan, void: bool, um: float, pitch: tuple[float, float]) -> None:
+    """The heights of TOP_FIRST in units of `um` micrometres, with the void as a hole."""
+    assert scan.um_per_unit is not None
+    expected = (with_void(np.nan, "f8") if void else TOP_FIRST)[::-1] * um
+    # a constant height changes nothing
+    found = scan.heights * scan.um_per_unit
+    np.testing.assert_allclose(found - np.nanmin(found), expected - np.nanmin(expected), rtol=2e-5, atol=1e-9)
+    assert scan.pitch_um == pytest.approx(pitch, rel=1e-5)

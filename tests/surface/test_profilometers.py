@@ -1,8 +1,6 @@
 """Files of more instruments, written by the tests from the published layouts: orientation, units, voids, names."""
 
-import io
 import struct
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,8 +9,7 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.surface.readers import read_scan
-from pipeline.surface.scan import Scan
-from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, VOID, padded, with_void
+from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, VOID, check, packed, padded, with_void
 
 pytestmark = pytest.mark.usefixtures("surface_topography")
 
@@ -93,7 +90,7 @@ def vk4() -> bytes:
 
 def vk6() -> bytes:
     """Keyence VK6: a VK4 file in a zip behind a thumbnail."""
-    return b"VK6" + struct.pack("<I", 4) + b"BM\0\0" + _zip({"Vk4File": vk4()})
+    return b"VK6" + struct.pack("<I", 4) + b"BM\0\0" + packed({"Vk4File": vk4()})
 
 
 def plux() -> bytes:
@@ -103,7 +100,7 @@ def plux() -> bytes:
     layer = "<LAYER_0><FILENAME_Z>LAYER_0.raw</FILENAME_Z></LAYER_0>"
     info = "<INFO><SIZE>1</SIZE><ITEM_0><NAME>Device</NAME><VALUE>S neox</VALUE></ITEM_0></INFO>"
     xml = f"<xml><GENERAL>{inside}</GENERAL>{layer}{info}</xml>"
-    return _zip({"index.xml": xml.encode(), "LAYER_0.raw": with_void(np.nan, "<f4").tobytes()})
+    return packed({"index.xml": xml.encode(), "LAYER_0.raw": with_void(np.nan, "<f4").tobytes()})
 
 
 def zon() -> bytes:
@@ -122,7 +119,7 @@ def zon() -> bytes:
         "4cdb0c75-5706-48cc-a9a1-adf395d609ae": heights,
         "9e7ca6dd-0e6a-4d7b-8986-f0a7b773c916": marks,
     }
-    return b"KPK0" + struct.pack("<I", 4) + b"BM\0\0" + _zip(members)
+    return b"KPK0" + struct.pack("<I", 4) + b"BM\0\0" + packed(members)
 
 
 def opdx() -> bytes:
@@ -184,14 +181,6 @@ def bsdf(kind: int, dtype: str, void: float) -> bytes:
     return header + with_void(void, dtype).tobytes()
 
 
-def _zip(members: dict[str, bytes]) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w") as archive:
-        for member, data in members.items():
-            archive.writestr(member, data)
-    return file.getvalue()
-
-
 SQUARE = (0.1, 0.1)
 # name -> (content, void, micrometres per unit of TOP_FIRST, pitch)
 FILES: dict[str, tuple[Callable[[], bytes], bool, float, tuple[float, float]]] = {
@@ -212,16 +201,6 @@ FILES: dict[str, tuple[Callable[[], bytes], bool, float, tuple[float, float]]] =
     "i4.sdf": (lambda: bsdf(6, "<i4", -(2**31)), True, 1e-3, PITCH_UM),
     "f8.sdf": (lambda: bsdf(7, "<f8", np.nan), True, 1e-3, PITCH_UM),
 }
-
-
-def check(scan: Scan, void: bool, um: float, pitch: tuple[float, float]) -> None:
-    """The heights of TOP_FIRST in units of `um` micrometres, with the void as a hole."""
-    assert scan.um_per_unit is not None
-    expected = (with_void(np.nan, "f8") if void else TOP_FIRST)[::-1] * um
-    # a constant height changes nothing
-    found = scan.heights * scan.um_per_unit
-    np.testing.assert_allclose(found - np.nanmin(found), expected - np.nanmin(expected), rtol=2e-5, atol=1e-9)
-    assert scan.pitch_um == pytest.approx(pitch, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -10,14 +10,13 @@ class Format:
     """One format.
 
     key: its name in sniff.py, and in SurfaceTopography for that library's formats. name: in words. suffixes: usual
-    ones. reader: the library that reads it. tried: whether tests read a file of the format.
+    ones. reader: the library that reads it. Tests read a file of each format.
     """
 
     key: str
     name: str
     suffixes: tuple[str, ...]
     reader: str
-    tried: bool = True
 
 
 READ = (
@@ -42,7 +41,7 @@ READ = (
     Format("sdf", "ISO 25178-71 .sdf", (".sdf",), LIBRARY),
     Format("x3p", "ISO 25178-72 .x3p", (".x3p",), LIBRARY),
     Format("sur", "Digital Surf .sur", (".sur",), LIBRARY),
-    Format("mnt", "Digital Surf Mountains .mnt", (".mnt",), LIBRARY, tried=False),
+    Format("mnt", "Digital Surf Mountains .mnt", (".mnt",), LIBRARY),
     Format("opd", "Wyko .opd", (".opd",), LIBRARY),
     Format("opdx", "Dektak .OPDx", (".opdx",), LIBRARY),
     Format("asc", "Wyko ASCII", (".asc",), LIBRARY),
@@ -58,10 +57,10 @@ READ = (
     Format("vk", "Keyence .vk3/.vk4/.vk6/.vk7", (".vk3", ".vk4", ".vk6", ".vk7"), LIBRARY),
     Format("zon", "Keyence .zon", (".zon",), LIBRARY),
     Format("zmg", "KLA Zeta .zmg", (".zmg",), LIBRARY),
-    Format("lext", "Olympus LEXT", (".lext",), LIBRARY, tried=False),
-    Format("oir", "Olympus .oir", (".oir",), LIBRARY, tried=False),
-    Format("poir", "Olympus .poir", (".poir",), LIBRARY, tried=False),
-    Format("nmm", "nano measuring machine .zip", (".zip",), LIBRARY, tried=False),
+    Format("lext", "Olympus LEXT", (".lext",), LIBRARY),
+    Format("oir", "Olympus .oir", (".oir",), LIBRARY),
+    Format("poir", "Olympus .poir", (".poir",), LIBRARY),
+    Format("nmm", "nano measuring machine .zip", (".zip",), LIBRARY),
     Format("nc", "NetCDF", (".nc",), LIBRARY),
     Format("mat", "MATLAB .mat", (".mat",), LIBRARY),
     Format("h5", "HDF5", (".h5", ".hdf5"), LIBRARY),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.surface.readers import igor, nanoscope
+from pipeline.surface.readers import igor, nanoscope, olympus
 from pipeline.surface.readers.common import (
     EXPORT,
     fault,
@@ -36,6 +36,8 @@ _LIBRARY = LIBRARY
 # arrays lie as in .npy, and the library takes their first axis for x; it takes a line of Wyko's text for a row, which
 # is a column of the image, from the bottom (Gwyddion's opdfile.c)
 _TRANSPOSED = ("h5", "mat", "asc")
+# whose first line has the lowest y: the tables of a nano measuring machine hold the Ly of each sample
+_BOTTOM_FIRST = ("nmm",)
 # modules that are not named as the format in capital letters
 _MODULES = {
     "opdx": "OPDx",
@@ -75,6 +77,8 @@ def read(path: Path, key: str, channel: str | None) -> Scan:
         heights = _heights(stored, key)
         if key == "nms":
             heights[_end_codes(heights, _notes(chosen))] = np.nan
+        if key in olympus.KEYS:
+            heights[olympus.not_measured(path, key, chosen)[::-1]] = np.nan
         steps = _steps(path, key, chosen)
         pitch = None if steps is None or unit is None else (steps[0] * unit, steps[1] * unit)
         form = ", ".join((BY_LIBRARY[key], *_direction(chosen)))
@@ -216,7 +220,9 @@ def _heights(stored: Any, key: str) -> NDArray[np.float64]:
     """
     # it masks the samples that a format marks as not measured
     filled = np.ma.filled(np.ma.asarray(stored, dtype=np.float64), np.nan)
-    return np.ascontiguousarray(filled if key in _TRANSPOSED else filled.T[::-1])
+    if key not in _TRANSPOSED:
+        filled = filled.T if key in _BOTTOM_FIRST else filled.T[::-1]
+    return np.ascontiguousarray(filled)
 
 
 def _end_codes(heights: NDArray[np.float64], header: dict[str, Any]) -> NDArray[np.bool_]:
