@@ -129,6 +129,18 @@ def held_bytes() -> int:
     return _field("/proc/self/status", "VmRSS") or 0
 
 
+def peak_bytes() -> int:
+    """Returns the most memory that this process held since its start, or since `forget_peak`; 0 where unknown."""
+    # the peak of getrusage starts with the parent's memory at exec
+    return _field("/proc/self/status", "VmHWM") or 0
+
+
+def forget_peak() -> None:
+    """Starts the peak of `peak_bytes` anew, at what this process holds. Raises OSError where the system cannot."""
+    # 5 resets the high-water mark (proc(5))
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+
+
 def require(what: str, more_bytes: int, remedy: str) -> None:
     """Raises ResourceError where arrays of `more_bytes` in addition to what this process holds exceed the limit.
 

@@ -4,13 +4,12 @@ As a script it is that process; its arguments are a file of heights, their pitch
 as JSON.
 """
 
-import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 
+from pipeline import resources
 from pipeline.config.models import Config
 from pipeline.evaluation.speed import setting
 from pipeline.store import scratch
@@ -53,11 +52,7 @@ def _bake(arguments: list[str]) -> int:
     models = Config.model_validate_json(config), PolarLayout.model_validate_json(layout)
     made, chosen = setting.first_bake(field, *models)
     chosen.table(made)
-    # the peak of getrusage starts with the parent's memory at exec
-    status = Path("/proc/self/status").read_text(encoding="ascii")
-    found = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
-    assert found is not None
-    return 1024 * int(found[1])
+    return resources.peak_bytes()
 
 
 if __name__ == "__main__":
