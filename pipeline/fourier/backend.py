@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# the smoothing of a spectrum uses its plan again after some tenths of a second; until then, the plan occupies memory
-_KEEP_PLANS_S = 2.0
-
 
 def fft(values: Real) -> Complex:
     """Transforms values (n,) to (n,)."""
@@ -50,12 +47,13 @@ def _fftw() -> Iterator[ModuleType]:
 
 @cache
 def _interface() -> ModuleType:
-    """Configures pyFFTW's interfaces for this process, and returns that of `scipy.fft`."""
+    """Configures pyFFTW's interfaces for this process, and returns that of `scipy.fft`.
+
+    Their cache of plans stays off: a plan holds its input and its output, as much memory as the transform took.
+    """
     import pyfftw
     from pyfftw.interfaces import scipy_fft
 
     pyfftw.config.PLANNER_EFFORT = "FFTW_ESTIMATE"
-    pyfftw.interfaces.cache.enable()
-    pyfftw.interfaces.cache.set_keepalive_time(_KEEP_PLANS_S)
     interface: ModuleType = scipy_fft
     return interface

@@ -7,6 +7,7 @@ import pyfftw
 import pytest
 import scipy.fft
 
+from pipeline import resources
 from pipeline.fourier import backend
 from pipeline.surface import recipes, statistics
 from pipeline.surface.recipes import random, snakes
@@ -38,6 +39,16 @@ def test_transforms_are_scipys(shape: tuple[int, int]) -> None:
     # what was given stays as it was
     np.testing.assert_array_equal(values, kept)
     np.testing.assert_array_equal(half, scipy.fft.rfft2(values))
+
+
+def test_a_transform_leaves_nothing_in_memory() -> None:
+    """The recipe's heights are all that is held afterwards; arrays of less than 32 MiB may stay in the heap."""
+    # loads the libraries
+    recipes.make(RECIPES["gaussian"])
+    before = resources.held_bytes()
+    made = recipes.make(GaussianRandom(kind="gaussian", size_um=105.0, pitch_um=0.05))
+    assert made.heights_um.nbytes > 2**25
+    assert resources.held_bytes() - before < 2 * made.heights_um.nbytes
 
 
 def test_fftw_does_the_work_here_and_nowhere_else(monkeypatch: pytest.MonkeyPatch) -> None:
