@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from pipeline.evaluation.check import Check
     from pipeline.evaluation.figures.bench import FigureResults
     from pipeline.evaluation.speed.bench import SpeedResults
+    from pipeline.evaluation.speed.growth import GrowthCurve
+    from pipeline.evaluation.speed.stage_costs import StageCost
     from pipeline.evaluation.speed.suite import Point, SurfaceSpeed
     from pipeline.evaluation.stability.bench import StabilityResults
 
@@ -36,8 +38,8 @@ def bench_command() -> None:
 
 @bench_command.command("speed")
 @click.argument("config_paths", metavar="[CONFIG]...", type=click.Path(path_type=Path), nargs=-1)
-@_out_option("out/speed", "speed.json, speed.csv and speed.png")
-@click.option("--quick", is_flag=True, help="Smaller maps and samples; no processes, no 4096 x 4096 scan.")
+@_out_option("out/speed", "speed.json, and speed and curve as .csv and .png")
+@click.option("--quick", is_flag=True, help="Smaller maps and samples, no large scans; processes only for one bake.")
 @console.store_option
 @console.json_option
 def speed_command(
@@ -48,7 +50,8 @@ def speed_command(
     The paper's tables over their parameters, the polar table over its own, the same polar table by FINUFFT and both
     in plain numpy, each with its mean CIELAB error at 7500 RU; the stages' shares of the device's peak and
     bandwidth, which are measured in the same run; the stack's transforms by the kernel, pyFFTW and scipy; the gain
-    of each constant of the kernels; and the cost of compiling. Without CONFIGs: three synthetic surfaces.
+    of each constant of the kernels; seconds and memory of each stage from 512 x 512 to 8192 x 8192 samples; and the
+    cost of compiling. Without CONFIGs: three synthetic surfaces.
     """
     from pipeline.evaluation.speed import bench
     from pipeline.store import scratch
@@ -179,9 +182,40 @@ def _print_speed(found: "SpeedResults") -> None:
                 "gain": lambda constant: f"{100.0 * (1.0 - constant.seconds / constant.other_s):.0f} %",
             },
         )
+    _print_curve(found.curve)
     console.say("")
     console.say("Criteria")
     _print_checks(found.checks)
+
+
+def _print_curve(curve: "GrowthCurve") -> None:
+    """A row for each size, and one for each file that was read."""
+    console.say("")
+    console.say("gaussian recipes to the certified table, a process each; peak memory measured / predicted")
+    _print_rows(
+        curve.sizes,
+        {
+            "samples": lambda size: f"{size.side}^2, {size.size_um:g} um",
+            "windows": lambda size: f"{size.windows} of sigma {size.sigma_um:g} um",
+            "surface": lambda size: _stage_cost(size.cost.stage("surface")),
+            "power spectrum": lambda size: _stage_cost(size.cost.stage("power_spectrum")),
+            "table": lambda size: _stage_cost(size.cost.stage("table")),
+            "from process start": lambda size: f"{size.cost.seconds:.3g} s",
+            "grows as samples to the": lambda size: "" if size.growth is None else f"{size.growth:.2f}",
+        },
+    )
+    for reading in curve.readings:
+        cost = reading.cost.stage("surface")
+        console.say(
+            f"surface from .{reading.format} of {reading.side}^2 float32: {_stage_cost(cost)}, "
+            f"and {cost.children_bytes / 2**20:.0f} MiB of the process that parses it"
+        )
+    if curve.fault:
+        console.say(f"note: the rest of the curve is missing: {curve.fault}")
+
+
+def _stage_cost(cost: "StageCost") -> str:
+    return f"{cost.seconds:.3g} s, {cost.peak_bytes / 2**20:.0f} / {cost.predicted_bytes / 2**20:.0f} MiB"
 
 
 def _print_surface(surface: "SurfaceSpeed", found: "SpeedResults") -> None:

@@ -24,8 +24,10 @@ def benched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Tool, Result]:
 def test_it_writes_what_it_measured(benched: tuple[Tool, Result]) -> None:
     tool, result = benched
     folder = tool.folder / "figures"
-    assert sorted(path.name for path in folder.iterdir()) == ["speed.csv", "speed.json", "speed.png"]
-    assert (folder / "speed.png").read_bytes().startswith(b"\x89PNG")
+    names = ["curve.csv", "curve.png", "speed.csv", "speed.json", "speed.png"]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    for name in ("curve.png", "speed.png"):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
     document = json.loads((folder / "speed.json").read_text(encoding="utf-8"))
     assert document == {key: value for key, value in result.json.items() if key != "files"}
     rows = list(csv.DictReader((folder / "speed.csv").read_text(encoding="utf-8").splitlines()))
@@ -58,6 +60,18 @@ def test_every_criterion_has_a_verdict(benched: tuple[Tool, Result]) -> None:
     assert {"small.speed.mean_error", "small.speed.second_light", "stability.taylor_float64_at_2_um"} <= set(ids)
 
 
+def test_the_curve_has_the_cost_of_every_stage(benched: tuple[Tool, Result]) -> None:
+    tool, result = benched
+    (size,) = result.json["curve"]["sizes"]
+    assert (size["side"], size["sigma_um"], size["windows"], size["growth"]) == (512, 6.25, 1, None)
+    assert [stage["stage"] for stage in size["cost"]["stages"]] == ["surface", "power_spectrum", "table"]
+    assert sum(stage["seconds"] for stage in size["cost"]["stages"]) < size["cost"]["seconds"]
+    (row,) = csv.DictReader((tool.folder / "figures" / "curve.csv").read_text(encoding="utf-8").splitlines())
+    for stage in size["cost"]["stages"]:
+        assert 50.0 < float(row[f"{stage['stage']}_mib"]) < 1000.0
+        assert float(row[f"{stage['stage']}_s"]) == pytest.approx(stage["seconds"], rel=1e-3)
+
+
 def test_shares_are_shares(benched: tuple[Tool, Result]) -> None:
     timed = benched[1].json["surfaces"][0]["timed"]
     assert {"stack", "power spectrum", "apply_operator", "paper table"} <= {stage["stage"] for stage in timed}
@@ -73,6 +87,7 @@ def test_a_tall_surface_has_no_paper_tables(tool: Tool) -> None:
     assert "polar table in plain numpy" in result.stdout
     assert "terms, single" in result.stdout
     assert "terms, double" in result.stdout
+    assert "512^2, 25 um" in result.stdout
 
 
 def test_built_in_surfaces_are_sound() -> None:

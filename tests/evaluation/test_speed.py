@@ -14,11 +14,13 @@ from pipeline.config.models import Config
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.evaluation import plain_numpy
-from pipeline.evaluation.speed import checks, machine, memory, nufft, polar_bake, setting, transforms, work
+from pipeline.evaluation.speed import checks, growth, machine, memory, nufft, polar_bake, setting, transforms, work
+from pipeline.evaluation.speed.growth import GrowthCurve, Reading, ScanCost
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
 from pipeline.evaluation.speed.polar_bake import Stages
 from pipeline.evaluation.speed.processes import Compiling, RunFailedError, warm_run_s
 from pipeline.evaluation.speed.setting import Setting
+from pipeline.evaluation.speed.stage_costs import BakeCost, StageCost
 from pipeline.evaluation.speed.timing import best_of
 from pipeline.evaluation.speed.truth import MapTruth
 from pipeline.optics.coherence import Coherence
@@ -238,3 +240,84 @@ def test_a_new_machine_has_bounds() -> None:
     }
     failed = checks.of_compiling(None, "no compiler")
     assert {(check.verdict, check.remark) for check in failed} == {("not measured", "no compiler")}
+
+
+def bake_cost(seconds: float, mib: int) -> BakeCost:
+    """A process that starts for a second and spends as long in every stage."""
+    costs = (StageCost(stage, seconds / 3.0, 2**30, mib * 2**20, 0) for stage in growth.STAGES)
+    return BakeCost(1.0 + seconds, tuple(costs))
+
+
+def sized(side: int, seconds: float, mib: int = 1) -> ScanCost:
+    return ScanCost(side, side * growth.PITCH_UM, 16.25, 9, bake_cost(seconds, mib), None)
+
+
+LIMITS = Machine("device", 2, 8, {}, single_flops=117e9, double_flops=58e9, bandwidth=1e10)
+
+
+def verdicts(curve: GrowthCurve, limits: Machine = LIMITS) -> dict[str, str]:
+    return {check.id.removeprefix("curve.speed."): check.verdict for check in checks.of_curve(curve, limits)}
+
+
+def test_work_that_grows_as_samples_has_the_exponent_one() -> None:
+    assert growth.growth(bake_cost(1.0, 1), 512, bake_cost(4.0, 1), 1024) == pytest.approx(1.0)
+    assert growth.growth(bake_cost(1.0, 1), 512, bake_cost(16.0, 1), 1024) == pytest.approx(2.0)
+
+
+def test_large_scans_have_bounds() -> None:
+    good = [sized(2048, 2.5), sized(4096, 10.9, 1536), sized(8192, 38.9, 3072)]
+    assert set(verdicts(GrowthCurve(good, [])).values()) == {"holds"}
+    bad = [sized(2048, 2.0), sized(4096, 11.1, 1537), sized(8192, 39.1, 3073)]
+    assert set(verdicts(GrowthCurve(bad, [])).values()) == {"misses"}
+    missing = GrowthCurve(good[:1], [], "out of luck")
+    assert set(verdicts(missing).values()) == {"not measured"}
+    assert "out of luck" in {check.remark for check in checks.of_curve(missing, LIMITS)}
+
+
+def test_a_slower_device_has_more_time_for_a_large_scan_and_a_faster_one_no_less() -> None:
+    curve = GrowthCurve([sized(4096, 12.0)], [])
+    for flops, verdict in ((100e9, "holds"), (117e9, "misses"), (480e9, "misses")):
+        assert verdicts(curve, replace(LIMITS, single_flops=flops))["seconds_4096"] == verdict
+    assert (
+        verdicts(GrowthCurve([sized(4096, 10.0)], []), replace(LIMITS, single_flops=480e9))["seconds_4096"] == "holds"
+    )
+
+
+def test_reading_a_large_file_counts_instead_of_making_its_heights() -> None:
+    large = sized(8192, 30.0, 2048)
+    held = [verdicts(GrowthCurve([large], [reading(seconds)])) for seconds in (1.0, 18.9, 19.1)]
+    assert [each["seconds_8192"] for each in held] == ["holds", "holds", "misses"]
+    assert verdicts(GrowthCurve([large], [reading(1.0, child_mib=2049)]))["memory_8192"] == "misses"
+
+
+def reading(seconds: float, child_mib: int = 0) -> Reading:
+    cost = StageCost("surface", seconds, 2**30, 2**30, child_mib * 2**20)
+    return Reading("npy", 8192, BakeCost(seconds + 1.0, (cost,)))
+
+
+@pytest.mark.parametrize("kind", growth.FORMATS)
+def test_a_file_is_read_in_a_process_of_its_own(kind: str) -> None:
+    found = growth.read(kind, 128)
+    assert [cost.stage for cost in found.cost.stages] == ["surface"]
+    assert 0.0 < found.seconds < found.cost.seconds
+    # an array is read without another process
+    assert (found.cost.stages[0].children_bytes > 0) == (kind == "tif")
+    assert 2**26 < found.peak_bytes < 2**30
+
+
+def test_a_curve_ends_where_a_bake_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sizes below it are kept, with their growth; the faster of two bakes counts."""
+    costs = [bake_cost(2.0, 1), bake_cost(1.0, 1), bake_cost(4.0, 1), bake_cost(5.0, 1)]
+
+    def measured(_config: Config, until: str) -> BakeCost:
+        assert until == "table"
+        if not costs:
+            raise RunFailedError("out of memory")
+        return costs.pop(0)
+
+    monkeypatch.setattr(growth.stage_costs, "measure", measured)
+    found = growth.measure((512, 1024, 4096), 2, growth.FORMATS)
+    assert [(size.side, size.cost.stages_s) for size in found.sizes] == [(512, 1.0), (1024, 4.0)]
+    assert [size.growth for size in found.sizes] == [None, pytest.approx(1.0)]
+    assert [size.windows for size in found.sizes] == [1, 1]
+    assert found.fault == "out of memory"

@@ -1,4 +1,4 @@
-"""The plot of `bench speed`: error against time, error against bytes."""
+"""The plots of `bench speed`: error against time and against bytes, and cost against the size of a scan."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,6 +8,8 @@ from matplotlib.lines import Line2D
 
 from pipeline.accuracy.plots import png
 from pipeline.evaluation.plots import palette
+from pipeline.evaluation.plots.charts import Chart, Series, charts
+from pipeline.evaluation.speed.growth import STAGES, GrowthCurve
 from pipeline.evaluation.speed.suite import (
     NUFFT,
     NUMPY_PAPER,
@@ -27,6 +29,7 @@ _COLOURS = {
     NUMPY_PAPER: palette.ORANGE,
     NUMPY_POLAR: palette.SKY,
 }
+_STAGE_COLOURS = dict(zip(STAGES, (palette.GREEN, palette.VERMILION, palette.BLUE), strict=True))
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
 
@@ -58,6 +61,28 @@ def error_against_cost(surfaces: Sequence[SurfaceSpeed], exposure_ru: float) -> 
     keys = [_key(names[method], _COLOURS[method], linewidth=2.5) for method in methods]
     figure.legend(handles=keys, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
     return png(figure)
+
+
+def cost_against_size(curve: GrowthCurve) -> bytes:
+    """Draw the seconds and the peak memory of every stage against the side of the scan, both axes logarithmic."""
+    sides = [size.side for size in curve.sizes]
+    seconds, mib, predicted = [], [], []
+    for stage, colour in _STAGE_COLOURS.items():
+        costs = [size.cost.stage(stage) for size in curve.sizes]
+        name = stage.replace("_", " ")
+        seconds.append(Series(name, sides, [cost.seconds for cost in costs], colour))
+        mib.append(Series(name, sides, [cost.peak_bytes / 2**20 for cost in costs], colour))
+        predicted.append(
+            Series(f"{name}, predicted", sides, [cost.predicted_bytes / 2**20 for cost in costs], colour, "o:")
+        )
+    whole = [size.cost.seconds for size in curve.sizes]
+    seconds.append(Series("from process start", sides, whole, palette.GREY))
+    with_samples = [whole[-1] * (side / sides[-1]) ** 2 for side in sides]
+    seconds.append(Series("in proportion to samples", sides, with_samples, palette.GREY, ":"))
+    axes: dict[str, Any] = {"x_label": "samples a side", "x_scale": "log"}
+    by_time = Chart("Seconds, scan to certified table", y_label="s", series=seconds, **axes)
+    by_memory = Chart("Peak memory", y_label="MiB", series=[*mib, *predicted], **axes)
+    return charts([[by_time, by_memory]], (5.5, 4.4))
 
 
 def _key(label: str, colour: str, **style: Any) -> Line2D:

@@ -10,8 +10,9 @@ from pipeline.config.models import Config
 from pipeline.evaluation import results
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.sources import as_published
-from pipeline.evaluation.speed import checks, constants, machine, memory, processes, setting, suite, truth
+from pipeline.evaluation.speed import checks, constants, growth, machine, memory, processes, setting, suite, truth
 from pipeline.evaluation.speed.constants import Constant
+from pipeline.evaluation.speed.growth import GrowthCurve
 from pipeline.evaluation.speed.machine import Machine, share
 from pipeline.evaluation.speed.processes import RunFailedError
 from pipeline.evaluation.speed.suite import FULL, MAIN, QUICK, SurfaceSpeed
@@ -25,6 +26,7 @@ from pipeline.surface.heightfield import HeightField
 
 # recipes, each with its defaults, where no config is named
 _BUILT_IN = ("elaphe", "xenopeltis", "blazed")
+_BAKES_A_SIZE = 2
 _COLUMNS = (
     *("surface", "method", "rings", "azimuths", "w_terms", "resolution", "step_nm", "textures", "texels"),
     *("seconds", "scaled", "bytes", "mean_delta_e", "percentile_99", "maximum"),
@@ -33,11 +35,15 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class SpeedResults:
-    """One run on one machine. constants: of the first surface's kernels, empty where not measured."""
+    """One run on one machine.
+
+    constants: of the first surface's kernels, empty where not measured. curve: cost over the size of a scan.
+    """
 
     machine: Machine
     surfaces: list[SurfaceSpeed]
     constants: list[Constant]
+    curve: GrowthCurve
     checks: list[Check]
 
     def document(self) -> dict[str, Any]:
@@ -46,17 +52,22 @@ class SpeedResults:
             {**results.plain(each), "timed": results.plain([share(timed, self.machine) for timed in each.timed])}
             for each in self.surfaces
         ]
-        return results.document(self.checks, machine=self.machine, surfaces=surfaces, constants=self.constants)
+        measured = {"surfaces": surfaces, "constants": self.constants, "curve": self.curve}
+        return results.document(self.checks, machine=self.machine, **measured)
 
     def files(self) -> dict[str, str | bytes]:
-        """Return speed.json, speed.csv (a row a table) and speed.png by name."""
+        """Return by name speed.json, speed.csv (a row a table), speed.png, curve.csv (a row a size), curve.png."""
         from pipeline.evaluation.plots import speed_plots
 
-        return {
+        files: dict[str, str | bytes] = {
             "speed.json": results.json_text(self.document()),
             "speed.csv": results.csv_text(list(self._rows()), _COLUMNS),
             "speed.png": speed_plots.error_against_cost(self.surfaces, truth.EXPOSURE_RU),
         }
+        if self.curve.sizes:
+            files["curve.csv"] = results.csv_text(self.curve.rows(), growth.COLUMNS)
+            files["curve.png"] = speed_plots.cost_against_size(self.curve)
+        return files
 
     def _rows(self) -> Iterator[dict[str, Any]]:
         for each in self.surfaces:
@@ -84,7 +95,7 @@ def run(
 ) -> SpeedResults:
     """Measure all surfaces and the machine.
 
-    configs: with the files that hold them. quick: smaller maps and samples; no processes, no large scan.
+    configs: with the files that hold them. quick: smaller maps and samples; one process, no large scan.
     command_line: the words that start the tool, for whole runs. note: called with the name of each part.
     """
     note("device:")
@@ -96,8 +107,16 @@ def run(
         limits = machine.best(limits, machine.measure())
     judged = [check for each in found for check in checks.of_surface(each, limits)]
     judged += verdict.criterion(verdict.sweep(sweep.tall()))
+    note(f"growth from {growth.SIDES[0]} x {growth.SIDES[0]} samples:")
     if quick:
-        return SpeedResults(limits, found, [], [*judged, checks.of_large_scan(None), *checks.of_compiling(None)])
+        curve = growth.measure(growth.SIDES[:1], 1, (), progress)
+    else:
+        curve = growth.measure(growth.SIDES, _BAKES_A_SIZE, growth.FORMATS, progress)
+    judged += checks.of_curve(curve, limits)
+    if quick:
+        return SpeedResults(
+            limits, found, [], curve, [*judged, checks.of_large_scan(None), *checks.of_compiling(None)]
+        )
     note("constants of the kernels:")
     first = configs[0][0]
     inputs = setting.make(_field(first, store, progress), first, MAIN)
@@ -105,7 +124,7 @@ def run(
     note(f"{memory.LARGE_SIDE} x {memory.LARGE_SIDE} samples, 64 terms:")
     judged.append(checks.of_large_scan(memory.peak_bytes(*memory.large_scan(), MAIN)))
     note("a new machine:")
-    return SpeedResults(limits, found, buys, [*judged, *_compiling(command_line, progress)])
+    return SpeedResults(limits, found, buys, curve, [*judged, *_compiling(command_line, progress)])
 
 
 def _field(config: Config, store: Store, progress: Progress) -> HeightField:

@@ -1,6 +1,9 @@
 """The acceptance criteria of the bench as checks; texts/criteria.toml has their words and bounds."""
 
+from collections.abc import Iterator
+
 from pipeline.evaluation.check import Check
+from pipeline.evaluation.speed.growth import GrowthCurve
 from pipeline.evaluation.speed.machine import Machine, share
 from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM
 from pipeline.evaluation.speed.processes import Compiling
@@ -20,7 +23,13 @@ from pipeline.evaluation.texts import Texts
 _TEXELS = 252_000
 # seconds of stack, power spectrum and table for an operation a second of the peak, by the floats of a register:
 # 0.045 s at 480 GFLOP/s with AVX-512, 0.11 s at 117 with AVX2
-_WIDE, _WIDE_WORK, _NARROW_WORK = 16, 0.045 * 480e9, 0.11 * 117e9
+_NARROW_FLOPS = 117e9
+_WIDE, _WIDE_WORK, _NARROW_WORK = 16, 0.045 * 480e9, 0.11 * _NARROW_FLOPS
+# seconds from scan to table by the side of the scan, on a device of this peak. A slower one has more time in
+# proportion; a faster one has no less, because not all of it is arithmetic of the device
+_CURVE_S = {4096: 12.0, 8192: 40.0}
+# the growth of these sides is judged: before them, the start of a process and the certificate take most of the time
+_GROWS_FROM, _GROWS_TO = 2048, 8192
 
 
 def of_surface(found: SurfaceSpeed, machine: Machine) -> list[Check]:
@@ -76,6 +85,31 @@ def of_surface(found: SurfaceSpeed, machine: Machine) -> list[Check]:
 def of_large_scan(peak_bytes: int | None) -> Check:
     """Return the criterion of a scan of 4096 x 4096 samples."""
     return Texts(__package__, "criteria").check("large_scan.speed.memory", _gib(peak_bytes))
+
+
+def of_curve(curve: GrowthCurve, machine: Machine) -> list[Check]:
+    """Return the criteria of large scans: seconds and memory from scan to certified table, and their growth."""
+    slower = max(1.0, _NARROW_FLOPS / machine.single_flops)
+    made = [check for side, bound in _CURVE_S.items() for check in _of_side(curve, side, bound * slower)]
+    small, large = curve.size(_GROWS_FROM), curve.size(_GROWS_TO)
+    ratio = None
+    if small is not None and large is not None:
+        ratio = large.cost.stages_s / small.cost.stages_s * (_GROWS_FROM / _GROWS_TO) ** 2
+    return [*made, Texts(__package__, "criteria").check("curve.speed.growth", ratio)]
+
+
+def _of_side(curve: GrowthCurve, side: int, bound_s: float) -> Iterator[Check]:
+    """The criteria of one size. Where files of it were read, the slowest to read counts instead of the recipe."""
+    texts, size, seconds, peak, remark = Texts(__package__, "criteria"), curve.size(side), None, None, curve.fault
+    if size is not None:
+        cost, readings = size.cost, [reading for reading in curve.readings if reading.side == side]
+        of_recipe = cost.stage("surface").seconds
+        seconds = cost.seconds - of_recipe + max([of_recipe, *(reading.seconds for reading in readings)])
+        peak = max([cost.peak_bytes, *(reading.peak_bytes for reading in readings)])
+        remark = f"{size.windows} windows; " + " + ".join(f"{stage.seconds:.3g}" for stage in cost.stages) + " s"
+        remark += "".join(f"; surface from .{reading.format} {reading.seconds:.3g} s" for reading in readings)
+    yield texts.check(f"curve.speed.seconds_{side}", seconds, bound=bound_s, remark=remark)
+    yield texts.check(f"curve.speed.memory_{side}", _gib(peak), remark=curve.fault if size is None else "")
 
 
 def _gib(size_bytes: int | None) -> float | None:

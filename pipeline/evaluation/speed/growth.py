@@ -24,21 +24,25 @@ from pipeline.surface import recipes, windows
 from pipeline.surface.recipes.parameters import GaussianRandom
 from pipeline.surface.source import SurfaceSource
 
-SIDES, QUICK_SIDES = (512, 1024, 2048, 4096, 8192), (512,)
+SIDES = (512, 1024, 2048, 4096, 8192)
 PITCH_UM = 25.0 / 512
 STAGES = ("surface", "power_spectrum", "table")
 FORMATS = ("npy", "tif")
+COLUMNS = (
+    *("side", "size_um", "sigma_um", "windows", "growth", "process_s"),
+    *(f"{stage}_{of}" for stage in STAGES for of in ("s", "mib", "predicted_mib")),
+)
 # a window holds four sigma, as in `pipeline.surface.windows`
 _WIDTH_SIGMAS = 4.0
-# scans up to this side are baked twice, of which the faster bake counts: other processes only add
-_TWICE = 2048
+# larger scans are baked once: they take long enough for a steady time
+_REPEATED = 2048
 # a scan file repeats a smaller patch, which is periodic
 _TILE = 1024
 _MIB = 2.0**20
 
 
 @dataclass(frozen=True)
-class Size:
+class ScanCost:
     """The cost of a scan of side x side samples.
 
     sigma_um, windows: width of the coherence window, and the number of those averaged. growth: exponent with which
@@ -74,14 +78,14 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Curve:
+class GrowthCurve:
     """The costs of all sizes, in order, and of reading the largest. fault: why sizes or files are missing."""
 
-    sizes: list[Size]
+    sizes: list[ScanCost]
     readings: list[Reading]
     fault: str = ""
 
-    def size(self, side: int) -> Size | None:
+    def size(self, side: int) -> ScanCost | None:
         """Return the size of a side, where it was measured."""
         return next((size for size in self.sizes if size.side == side), None)
 
@@ -90,23 +94,33 @@ class Curve:
         return [_row(size) for size in self.sizes]
 
 
-def measure(sides: Sequence[int], formats: Sequence[str], progress: Progress = silent) -> Curve:
+def measure(sides: Sequence[int], repeats: int, formats: Sequence[str], progress: Progress = silent) -> GrowthCurve:
     """Bake `gaussian` recipes of rising sides up to the table, each in a process of its own, and read the largest.
 
+    repeats: bakes of each of up to 2048 x 2048 samples, of which the fastest counts: other processes only add.
     formats: of the files that hold a scan of the last side, some of `FORMATS`.
     """
-    sizes: list[Size] = []
+    sizes: list[ScanCost] = []
     readings: list[Reading] = []
     total = sum(side**2 for side in sides)
     try:
         for side in sides:
-            sizes.append(_measured(side, sizes[-1] if sizes else None))
+            sizes.append(_measured(side, repeats if side <= _REPEATED else 1, sizes[-1] if sizes else None))
             progress("growth", sum(size.side**2 for size in sizes) / total)
         for kind in formats:
-            readings.append(_read(kind, sides[-1]))
+            readings.append(read(kind, sides[-1]))
     except RunFailedError as error:
-        return Curve(sizes, readings, str(error))
-    return Curve(sizes, readings)
+        return GrowthCurve(sizes, readings, str(error))
+    return GrowthCurve(sizes, readings)
+
+
+def read(kind: str, side: int) -> Reading:
+    """Run the surface stage of a scan file of a format, its heights in um. Raises RunFailedError."""
+    with scratch.temporary() as folder:
+        path = folder / f"scan.{kind}"
+        _write(path, side)
+        source = SurfaceSource(path=str(path), pitch_um=PITCH_UM, height_unit="um")
+        return Reading(kind, side, stage_costs.measure(_config(side, source), "surface"))
 
 
 def growth(before: BakeCost, before_side: int, after: BakeCost, after_side: int) -> float:
@@ -124,22 +138,14 @@ def _recipe(side: int) -> GaussianRandom:
     return GaussianRandom(kind="gaussian", size_um=side * PITCH_UM, pitch_um=PITCH_UM)
 
 
-def _measured(side: int, before: Size | None) -> Size:
+def _measured(side: int, repeats: int, before: ScanCost | None) -> ScanCost:
     recipe = _recipe(side)
     config = _config(side, SurfaceSource(recipe=recipe))
-    bakes = [stage_costs.measure(config, STAGES[-1]) for _ in range(2 if side <= _TWICE else 1)]
+    bakes = [stage_costs.measure(config, STAGES[-1]) for _ in range(repeats)]
     cost = min(bakes, key=lambda bake: bake.stages_s)
     count = windows.places(recipes.extent(recipe), config.coherence).count
     exponent = None if before is None else growth(before.cost, before.side, cost, side)
-    return Size(side, side * PITCH_UM, config.coherence.sigma_um, count, cost, exponent)
-
-
-def _read(kind: str, side: int) -> Reading:
-    with scratch.temporary() as folder:
-        path = folder / f"scan.{kind}"
-        _write(path, side)
-        source = SurfaceSource(path=str(path), pitch_um=PITCH_UM, height_unit="um")
-        return Reading(kind, side, stage_costs.measure(_config(side, source), "surface"))
+    return ScanCost(side, side * PITCH_UM, config.coherence.sigma_um, count, cost, exponent)
 
 
 def _write(path: Path, side: int) -> None:
@@ -151,7 +157,7 @@ def _write(path: Path, side: int) -> None:
         Image.fromarray(heights).save(path)
 
 
-def _row(size: Size) -> dict[str, Any]:
+def _row(size: ScanCost) -> dict[str, Any]:
     row: dict[str, Any] = {"side": size.side, "size_um": size.size_um, "sigma_um": size.sigma_um}
     row |= {"windows": size.windows, "process_s": size.cost.seconds, "growth": size.growth}
     for stage in size.cost.stages:
