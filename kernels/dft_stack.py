@@ -11,6 +11,9 @@ from kernels import device, factored_axis, programs
 from kernels.factored_axis import FactoredAxis
 
 _LINE_BYTES = 64
+# of terms between the transforms along both axes, where rows divide into strips. Strips after the first add to the
+# whole stack: two take a tenth longer than one, four a third, eight twice as long
+_MOST_BETWEEN_BYTES, _MOST_STRIPS = 288 * 2**20, 4
 _ITEMS_A_UNIT = 4  # work-items, each with scratch that stays in a core's cache
 
 
@@ -29,7 +32,18 @@ class Kept:
 
 
 def between_bytes(kept: Kept, rows: int) -> int:
-    """Bytes of what `transform` of `rows` rows holds between its steps: a line of terms, real and imaginary."""
+    """Bytes of what `transform` of `rows` rows holds between its steps: a line of terms of a strip of rows."""
+    return _strip_bytes(kept, rows // _strips(kept, rows))
+
+
+def _strips(kept: Kept, rows: int) -> int:
+    """Strips of rows that are transformed one after the other: as few as the bound allows, or the most."""
+    strips = [n for n in range(1, min(rows, _MOST_STRIPS) + 1) if rows % n == 0]
+    return next((n for n in strips if _strip_bytes(kept, rows // n) <= _MOST_BETWEEN_BYTES), strips[-1])
+
+
+def _strip_bytes(kept: Kept, rows: int) -> int:
+    """Bytes of a line of terms, real and imaginary, of a strip."""
     return 2 * _LINE_BYTES * (max(kept.phi_max, kept.reach) + 1) * _apart(rows)
 
 
@@ -53,12 +67,13 @@ def transform(
     double: a recurrence in single precision would lose n^2 of its digits at |t| = 1.
     """
     ny, nx = heights_um.shape
-    line, terms = _LINE_BYTES // out.dtype.itemsize, out.shape[3]
-    columns, tall = max(kept.phi_max, kept.reach) + 1, _apart(ny)
+    line, terms, strips = _LINE_BYTES // out.dtype.itemsize, out.shape[3], _strips(kept, ny)
+    columns, rows = max(kept.phi_max, kept.reach) + 1, ny // strips
+    tall = _apart(rows)
     program = programs.polar() if out.dtype == np.float32 else programs.exact()
     blocks = device.default_device().blocks
     pairs, groups = blocks.chosen("K_PAIRS")["K_PAIRS"], line // blocks.lanes(out.dtype.itemsize)
-    x, y = factored_axis.of_real(nx, columns, pairs), factored_axis.of_complex(ny, kept.psi_max, pairs)
+    x, y = factored_axis.of_real(nx, columns, pairs), factored_axis.of_complex(rows, kept.psi_max, pairs)
     items, room = _ITEMS_A_UNIT * device.default_device().compute_units, max(x.vectors(groups), y.vectors(groups))
     scratch = device.result_buffer(_LINE_BYTES // groups * items * room), np.int64(room)
     between = device.empty((columns, tall, 2, line), out.dtype)
@@ -68,17 +83,25 @@ def transform(
         device.shared(out),
     )
     along_x, along_y = _tables(x, out.dtype), _tables(y, out.dtype)
-    order = np.array((y.inner, y.levels[2].points), np.int32)
-    mean = out.dtype.type(1.0 / heights_um.size)
+    order, divided = np.array((y.inner, y.levels[2].points), np.int32), np.array((rows, strips), np.int32)
+    shifts = [device.upload(_shift(strip, kept, heights_um.shape).astype(out.dtype)) for strip in range(strips)]
     for first in range(0, terms, line):
         heights = samples, np.float64(scale_per_um), np.int32(first_term + first)
-        program.launch("along_x", (items,), *heights, *along_x, np.int32(ny), order, np.int32(tall), *scratch, narrow)
-        shape = (np.int32(n) for n in (first, terms, kept.reach, kept.phi_max, kept.shape[0]))
-        program.launch(
-            "along_y", (items,), narrow, *along_y, np.int32(columns), np.int32(tall), *scratch, *shape, mean, result
-        )
+        shape = [np.int32(n) for n in (first, terms, kept.reach, kept.phi_max, kept.shape[0])]
+        for strip, shift in enumerate(shifts):
+            part = divided, np.int32(strip), order, np.int32(tall)
+            program.launch("along_x", (items,), *heights, *along_x, *part, *scratch, narrow)
+            sizes = np.int32(columns), np.int32(tall), *scratch, *shape
+            program.launch("along_y", (items,), narrow, *along_y, *sizes, shift, np.int32(strip), result)
         done(min(1.0, (first + line) / terms))
     return device.settle(result, out)
+
+
+def _shift(strip: int, kept: Kept, samples: tuple[int, ...]) -> NDArray[np.float64]:
+    """exp(2 pi i strip psi / ny) / samples of every row of a stack, (rows, 2)."""
+    psi = np.arange(-kept.psi_max, kept.psi_max + 1)
+    angle = 2.0 * np.pi / samples[0] * (strip * psi % samples[0])
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1) / (samples[0] * samples[1])
 
 
 def _tables(axis: FactoredAxis, dtype: Any) -> list[Any]:

@@ -124,9 +124,12 @@ def of_real(n: int, columns: int, pairs: int) -> FactoredAxis:
 
 @cache
 def of_complex(n: int, highest: int, pairs: int) -> FactoredAxis:
-    """Transform n complex samples, of which the frequencies from -highest to highest are wanted."""
-    points = _points(n, highest, pairs, real=False)
-    return _axis(points, np.arange(-highest, highest + 1) % n, np.arange(2 * highest + 1), pairs)
+    """Transform n complex samples, of which the frequencies from -highest to highest are wanted.
+
+    Of more than n frequencies, those that repeat the first n are not placed.
+    """
+    points, places = _points(n, highest, pairs, real=False), np.arange(min(n, 2 * highest + 1))
+    return _axis(points, (places - highest) % n, places, pairs)
 
 
 def _axis(points: tuple[int, int, int], k: NDArray[np.int64], places: NDArray[np.int64], pairs: int) -> FactoredAxis:

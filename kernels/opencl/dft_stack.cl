@@ -14,6 +14,9 @@
  * sines, hence a sum and a difference of them meet half of the factors, and the frequencies k and N1 - k share both
  * results. Where N1 is even, points j and j + N1 / 2 are added first for even k, and subtracted for odd k.
  *
+ * What lies between both axes may be larger than memory allows. Then strips of rows, y = s, s + S, ... each, follow one
+ * another, and their transforms along y are added up: F[psi] = sum_s exp(2 pi i s psi / N) F_s[psi mod N / S].
+ *
  * along_x transforms the rows of samples along x; along_y transforms the columns phi = 0 .. columns - 1 of what it
  * wrote along y, and stores small phi at -phi, too, for heights are real. Real samples need k1 <= N1 / 2 alone, and the
  * frequencies -k follow. Work-items take rows or columns get_global_size(0) apart, each with scratch of its own.
@@ -31,21 +34,23 @@
  *   place       int[tiles][sets][blocks][K_PAIRS][2]    1     the column of each frequency, those of -k3 second; -1 for
  *                                                     none, and -2 - column for that of its negative
  *   axis        Axis                            1     sizes along x
- *   ny          int                             1     rows
+ *   rows        int2                            1     of a strip, and strips: strip s has the rows y = s, s + strips, ...
+ *   strip       int                             1     s
  *   along       int2                            1     N1 N2 and N3 along y: the order of rows in `narrow`
  *   tall        int                             1     rows of `narrow` from column to column
  *   scratch     VECTOR[work-items][room]        1     room as `transform` computes it
  *   room        long                            1     vectors of scratch of a work-item
- *   narrow      VECTOR[columns][tall][GROUPS][2]  1   result: real and imaginary part; row y, counted from the middle
- *                                                     sample, is at (y mod N3) N1 N2 + y / N3
+ *   narrow      VECTOR[columns][tall][GROUPS][2]  1   result: real and imaginary part; row j of the strip, whose y
+ *                                                     counts from the middle sample, is at (j mod N3) N1 N2 + j / N3
  *
  * along_y
  *   narrow      VECTOR[columns][tall][GROUPS][2]  1   as along_x wrote it
  *   factors     REAL[]                          1     as above, along y
  *   turn        REAL[n1 + n1 n2 + n][2]         1     as above, along y
  *   of          int[tiles]                      1     the k of a tile of the last level
- *   place       int[tiles][sets][blocks][K_PAIRS][2]    1     the row of each frequency; -1 for none
- *   axis        Axis                            1     sizes along y
+ *   place       int[tiles][sets][blocks][K_PAIRS][2]    1     the first row of each frequency, which repeats after as
+ *                                                     many rows as the strip has samples; -1 for none
+ *   axis        Axis                            1     sizes along y, of a strip
  *   columns     int                             1     of narrow
  *   tall        int                             1     rows of `narrow` from column to column
  *   scratch     VECTOR[work-items][room]        1     as above
@@ -55,7 +60,8 @@
  *   reach       int                             1     columns left of phi = 0
  *   phi_max     int                             1     the last column
  *   rows        int                             1     of the stack; psi = 0 is the middle one
- *   mean        REAL                            1     1 / samples
+ *   shift       REAL[rows][2]                   1     exp(2 pi i s psi / N) / samples, of strip s
+ *   strip       int                             1     s: what is there already is added to, but for the first strip
  *   stack       REAL[rows][reach + phi_max + 1][2][terms]   1   result: F_n, real and imaginary parts
  *
  * Set by the host: REAL and WIDTH, one vector register of the device; K_PAIRS, the pairs of frequencies k and -k whose
@@ -331,8 +337,8 @@ static APART void order_row(const long next, __global const double *row, const d
 
 __kernel void along_x(__global const double *heights, const double scale, const int first,
                       __global const REAL *factors, __global const REAL *turn, __global const int *of,
-                      __global const int *place, const Axis axis, const int ny, const int2 along, const int tall,
-                      __global VECTOR *scratch, const long room, __global VECTOR *narrow) {
+                      __global const int *place, const Axis axis, const int2 rows, const int strip, const int2 along,
+                      const int tall, __global VECTOR *scratch, const long room, __global VECTOR *narrow) {
     const int points = axis.first.points * axis.second.points, n3 = axis.last.points;
     __global VECTOR *b = scratch + get_global_id(0) * room, *sample = b + PARTS * GROUPS * points * axis.stride;
     /* whole vectors of samples */
@@ -344,9 +350,11 @@ __kernel void along_x(__global const double *heights, const double scale, const 
     const int each = (axis.last.entries - 1) * K_PAIRS * 2;
 
     ROLLED for (int i = 0; i < n3 * length; ++i) t[i] = 0.0;
-    ROLLED for (int at = get_global_id(0); at < ny; at += get_global_size(0)) {
-        const int y = at % along.x * along.y + at / along.x;
-        order_row((long)along.y * axis.n * get_global_size(0), heights + (long)((y + ny / 2) % ny) * axis.n, scale, axis, length, t);
+    const int ny = rows.x * rows.y;
+    const long next = (long)rows.y * along.y * axis.n * get_global_size(0);
+    ROLLED for (int at = get_global_id(0); at < rows.x; at += get_global_size(0)) {
+        const int y = (at % along.x * along.y + at / along.x) * rows.y + strip;
+        order_row(next, heights + (long)((y + ny / 2) % ny) * axis.n, scale, axis, length, t);
         ROLLED for (int j = 0; j < n3; ++j) {
             ROLLED for (int i = 0; i < length; i += DOUBLES)
                 terms_of(vload8(0, t + j * length + i), first, (__global REAL *)(sample + i * GROUPS));
@@ -374,21 +382,25 @@ __kernel void along_x(__global const double *heights, const double scale, const 
     }
 }
 
-/* A coefficient's real and imaginary parts, which are `terms` apart; the first `lit` lanes of either. */
-static INLINE void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, __global REAL *to) {
+/* A coefficient's real and imaginary parts, which are `terms` apart; the first `lit` lanes of either. Those of a later
+ * strip are added to what is there. */
+static INLINE void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, const int strip,
+                               __global REAL *to) {
     if (lit >= WIDTH && terms % WIDTH == 0) {
-        STREAM(re, (__global VECTOR *)to);
-        STREAM(im, (__global VECTOR *)(to + terms));
+        __global VECTOR *real = (__global VECTOR *)to, *imaginary = (__global VECTOR *)(to + terms);
+        STREAM(strip ? *real + re : re, real);
+        STREAM(strip ? *imaginary + im : im, imaginary);
     } else ROLLED for (int n = 0; n < lit; ++n) {
-        to[n] = ((const REAL *)&re)[n];
-        to[terms + n] = ((const REAL *)&im)[n];
+        to[n] = (strip ? to[n] : 0) + ((const REAL *)&re)[n];
+        to[terms + n] = (strip ? to[terms + n] : 0) + ((const REAL *)&im)[n];
     }
 }
 
 __kernel void along_y(__global const VECTOR *narrow, __global const REAL *factors, __global const REAL *turn,
                       __global const int *of, __global const int *place, const Axis axis, const int columns,
                       const int tall, __global VECTOR *scratch, const long room, const int first, const int terms,
-                      const int reach, const int phi_max, const int rows, const REAL mean, __global REAL *stack) {
+                      const int reach, const int phi_max, const int rows, __global const REAL *shift, const int strip,
+                      __global REAL *stack) {
     const int points = axis.first.points * axis.second.points, n3 = axis.last.points;
     __global VECTOR *b = scratch + get_global_id(0) * room, *own = b + PARTS * points * axis.stride, *folded = own;
     __global const REAL *last = factors + factors_of(axis.first) + factors_of(axis.second);
@@ -416,13 +428,17 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *factor
                                 f);
                     __global const int *to_rows = place + (t * axis.last.sets * axis.last.blocks + block) * K_PAIRS * 2;
                     ROLLED for (int i = 0; i < 2 * K_PAIRS; ++i) {
-                        const int row = to_rows[i];
-                        if (row < 0) continue;
-                        const VECTOR re = mean * f[i / 2][i % 2][0], im = mean * f[i / 2][i % 2][1];
-                        /* small phi is stored at -phi, too */
-                        ROLLED for (int side = phi > phi_max; side < (phi > 0 && phi <= reach ? 2 : 1); ++side) {
-                            const long at = side ? (rows - 1 - row) * width + reach - phi : row * width + reach + phi;
-                            store_terms(re, side ? -im : im, lit, terms, stack + at * PARTS * terms + begin);
+                        if (to_rows[i] < 0) continue;
+                        ROLLED for (int row = to_rows[i]; row < rows; row += axis.n) {
+                            const VECTOR c = shift[PARTS * row], s = shift[PARTS * row + 1];
+                            const VECTOR re = fma(-s, f[i / 2][i % 2][1], c * f[i / 2][i % 2][0]);
+                            const VECTOR im = fma(s, f[i / 2][i % 2][0], c * f[i / 2][i % 2][1]);
+                            /* small phi is stored at -phi, too */
+                            ROLLED for (int side = phi > phi_max; side < (phi > 0 && phi <= reach ? 2 : 1); ++side) {
+                                const long at = side ? (rows - 1 - row) * width + reach - phi : row * width + reach + phi;
+                                __global REAL *to = stack + at * PARTS * terms + begin;
+                                store_terms(re, side ? -im : im, lit, terms, strip, to);
+                            }
                         }
                     }
                 }

@@ -80,6 +80,17 @@ def test_the_kernel_and_fftw_agree(ny, nx, dtype, tolerance):
     assert np.max(np.abs(difference)) < tolerance
 
 
+@PRECISIONS
+@pytest.mark.parametrize(("ny", "strips"), [(36, 2), (36, 4), (35, 5), (37, 1)])
+def test_strips_of_rows_add_up(monkeypatch, ny, strips, dtype, tolerance):
+    """More frequencies may be kept than a strip has samples; a prime number of rows is one strip."""
+    kept = kept_of(ny, 30)
+    monkeypatch.setattr(dft_stack, "_MOST_STRIPS", 5)
+    monkeypatch.setattr(dft_stack, "_MOST_BETWEEN_BYTES", dft_stack.between_bytes(kept, ny // strips))
+    assert dft_stack.between_bytes(kept, ny) == dft_stack.between_bytes(kept, ny // strips)
+    test_transforms_equal_explicit_sums(by_kernel, ny, 30, dtype, tolerance, "chebyshev")
+
+
 @pytest.mark.parametrize("width", [4, 8, 16])
 def test_vectors_of_any_processor_hold_the_terms(monkeypatch, width):
     """Two to eight doubles of a register."""

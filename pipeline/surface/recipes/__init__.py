@@ -97,7 +97,7 @@ def making_bytes(recipe: Recipe, samples: int) -> int:
         case TiltedMirror() | CompactDisc():
             arrays = 2
         case GaussianRandom():
-            arrays = 5
+            arrays = 4
         case Elaphe() | Xenopeltis():
             arrays = 13
         case _:

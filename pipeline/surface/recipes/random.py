@@ -18,7 +18,8 @@ def gaussian(recipe: GaussianRandom) -> HeightField:
     """
     patch = patch_of(recipe)
     noise = smooth_noise(generator(recipe.seed), patch.y, patch.x, as_pair(recipe.correlation_um))
-    return HeightField(recipe.sigma_h_um * noise, patch.pitch_um)
+    noise *= recipe.sigma_h_um
+    return HeightField(noise, patch.pitch_um)
 
 
 def smooth_noise(
@@ -37,13 +38,15 @@ def smooth_noise(
     white[0, 0] = 0.0
     noise = lowpass(white, y, x, (lx / np.sqrt(2), ly / np.sqrt(2)))
     rms = float(np.sqrt(np.mean(noise**2)))
-    return noise / rms if rms > 0 else noise
+    if rms > 0:
+        noise /= rms
+    return noise
 
 
 def lowpass(
     spectrum: NDArray[np.complex128], y: Axis, x: Axis, length_um: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Multiplies a spectrum by exp(-pi^2 (lx^2 fx^2 + ly^2 fy^2)) and transforms it back.
+    """Multiplies a spectrum in place by exp(-pi^2 (lx^2 fx^2 + ly^2 fy^2)) and transforms it back.
 
     That is a periodic convolution with a Gaussian of standard deviation length / sqrt(2).
 
@@ -52,5 +55,5 @@ def lowpass(
     """
     fx = np.fft.rfftfreq(x.samples, x.pitch_um)
     fy = np.fft.fftfreq(y.samples, y.pitch_um)
-    gain = np.exp(-((np.pi * length_um[1] * fy[:, None]) ** 2)) * np.exp(-((np.pi * length_um[0] * fx) ** 2))
-    return fourier.irfft2(spectrum * gain, (y.samples, x.samples))
+    spectrum *= np.exp(-((np.pi * length_um[1] * fy[:, None]) ** 2)) * np.exp(-((np.pi * length_um[0] * fx) ** 2))
+    return fourier.irfft2(spectrum, (y.samples, x.samples))
