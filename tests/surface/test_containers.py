@@ -21,7 +21,7 @@ DASHES = "-" * 42
 STEPS = (100_000, 200_000, 1000)
 
 
-def nmm() -> bytes:
+def nmm(micro: bytes = b"[um]") -> bytes:
     """A nano measuring machine's scan: a description, and a table for each line, whose Ly grows from line to line."""
     pitch_x, pitch_y = PITCH_UM
     field = {"Number of scans": "1", "Number of lines": str(NY)}
@@ -35,7 +35,7 @@ def nmm() -> bytes:
         members[f"a_1_{line + 1}.dsc"] = "\n".join([DASHES, *told, DASHES])
         rows = [f"{1e-6 * pitch_x * i} {1e-6 * pitch_y * line} {1e-9 * h}" for i, h in enumerate(heights)]
         members[f"a_1_{line + 1}.dat"] = "\n".join(rows)
-    return packed({name: text.encode() for name, text in members.items()})
+    return packed({name: text.encode().replace(b"[um]", micro) for name, text in members.items()})
 
 
 def directory(start: int, entries: dict[int, tuple[int, bytes]], following: int = 0) -> bytes:
@@ -202,6 +202,8 @@ def mnt(masked: bool = True) -> bytes:
 # name -> (content, void, micrometres per unit of TOP_FIRST)
 FILES: dict[str, tuple[Callable[[], bytes], bool, float]] = {
     "a.zip": (nmm, False, 1e-3),
+    "latin.zip": (lambda: nmm(b"[\xb5m]"), False, 1e-3),
+    "utf8.zip": (lambda: nmm("[\u00b5m]".encode()), False, 1e-3),
     "a.lext": (lext, True, 1e-3),
     "measured.lext": (lambda: lext(invalid=False), False, 1e-3),
     "a.oir": (oir, True, 1e-3),

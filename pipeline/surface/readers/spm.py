@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.surface.readers import igor, nanoscope, olympus
+from pipeline.surface.readers import igor, nanoscope, nmm, olympus
 from pipeline.surface.readers.common import (
     EXPORT,
     fault,
@@ -146,11 +146,18 @@ def _reader(key: str) -> Callable[..., Any]:
 
 
 def _source(path: Path, key: str) -> str | Callable[[], BytesIO]:
-    """Returns what the library opens. It knows .sdf by the name of the ISO, and not by the older one of the BCR."""
-    if key != "sdf":
+    """Returns what the library opens.
+
+    It knows .sdf by the name of the ISO, and not by the older one of the BCR. It reads the descriptions of a nano
+    measuring machine in UTF-8 only.
+    """
+    if key == "sdf":
+        data = path.read_bytes()
+        data = data[:1] + b"ISO" + data[4:]
+    elif key == "nmm":
+        data = nmm.in_utf8(path)
+    else:
         return str(path)
-    data = path.read_bytes()
-    data = data[:1] + b"ISO" + data[4:]
     return lambda: BytesIO(data)
 
 
