@@ -386,7 +386,7 @@ __kernel void along_x(__global const double *heights, const double scale, const 
  * strip are added to what is there. */
 static INLINE void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, const int strip,
                                __global REAL *to) {
-    if (lit >= WIDTH && terms % WIDTH == 0) {
+    if (lit == WIDTH && terms % WIDTH == 0) {
         __global VECTOR *real = (__global VECTOR *)to, *imaginary = (__global VECTOR *)(to + terms);
         STREAM(strip ? *real + re : re, real);
         STREAM(strip ? *imaginary + im : im, imaginary);
@@ -410,7 +410,7 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *factor
 
     ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0))
         ROLLED for (int g = 0; g < GROUPS; ++g) {
-            const int begin = first + g * WIDTH, lit = terms - begin;
+            const int begin = first + g * WIDTH, lit = min(terms - begin, WIDTH);
             __global const VECTOR *sample = narrow + ((long)phi * tall * GROUPS + g) * PARTS;
             ROLLED for (int j = 0; j < n3; ++j) {
                 __global const VECTOR *next = sample + PARTS * GROUPS * (j + 1) * points;
