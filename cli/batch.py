@@ -28,7 +28,7 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
     from pipeline.store import scratch
 
     store = console.open_store(store_root)
-    loaded = load_all(paths, store_root, until)
+    loaded = load_all(paths, store, until)
     if until in ("validate", "bundle"):
         for config in loaded:
             scratch.require_folder(out / config.name)
@@ -48,17 +48,16 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
         raise click.exceptions.Exit(errors[0]["code"])
 
 
-def load_all(paths: tuple[Path, ...], store_root: Path | None, until: str) -> "list[Config]":
+def load_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[Config]":
     """Loads configs, and checks those of which a stage is to do before any work starts.
 
-    until: name of the last stage.
+    store: where artifacts are looked for. until: name of the last stage.
     Raises ConfigError for faults, and for two configs of one name, which would share a folder.
     """
     from pipeline.config import read
     from pipeline.errors import ConfigError
     from pipeline.stages import run
 
-    store = console.open_store(store_root)
     seen: dict[str, tuple[Config, Path]] = {}
     for path in paths:
         config = read.load(path)
@@ -144,8 +143,10 @@ def _flank(flank: dict[str, Any] | None) -> str:
     """The largest error beside the mirror directions, and whether it is within its limit."""
     if flank is None:
         return ""
+    from pipeline.optics.coherence import FLANK_DELTA_E
+
     error = flank["colour"]
-    verdict = "" if flank["kept"] else ", above the limit of 5"
+    verdict = "" if flank["kept"] else f", above the limit of {FLANK_DELTA_E:g}"
     return f"; beside mirror directions at most {error['maximum']:.2g} at {error['exposure_ru']:g} RU{verdict}"
 
 

@@ -32,7 +32,7 @@ def explained(error: Exception) -> tuple[int, list[str]]:
 
 
 def is_of_output(error: Exception) -> bool:
-    """Whether stdout or stderr refused output: the reader ended (as in `| head`), or the disk is full."""
+    """Says whether stdout or stderr refused output: the reader ended (as in `| head`), or the disk is full."""
     return isinstance(error, OSError) and error.filename is None and error.errno in (errno.EPIPE, *FULL)
 
 

@@ -290,7 +290,7 @@ class ReferenceSize:
 
     @property
     def is_held(self) -> bool:
-        """Whether the stack stays in memory."""
+        """Says whether the stack stays in memory."""
         is_one = self.serves_all or self.places == MIDDLE
         return is_one and self.stack.stack_bytes(self.terms, 8) <= _HELD_BYTES
 

@@ -15,7 +15,7 @@ from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 
 # a window is four sigma wide ([D14] sec. 4.2); windows half a width apart still reduce the speckle
-_WIDTH_SIGMAS, _STEP_SIGMAS = 4.0, 2.0
+WIDTH_SIGMAS, _STEP_SIGMAS = 4.0, 2.0
 # windows per axis: each one costs the same, and each reduces the variance less than the one before
 _MOST = 3
 
@@ -72,6 +72,6 @@ def around(field: HeightField, place: tuple[int, int], shape: tuple[int, int]) -
 
 def _offsets(size_um: float, sigma_um: float) -> list[float]:
     """Computes the centres of windows along one axis, um from the middle, for windows that lie within the scan."""
-    room = size_um - _WIDTH_SIGMAS * sigma_um
+    room = size_um - WIDTH_SIGMAS * sigma_um
     count = min(_MOST, 1 + floor(room / (_STEP_SIGMAS * sigma_um))) if room > 0 else 1
     return [float(x) for x in np.linspace(-room / 2.0, room / 2.0, count)] if count > 1 else [0.0]

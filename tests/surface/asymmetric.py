@@ -2,12 +2,15 @@
 
 import io
 import zipfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.errors import InputError
+from pipeline.surface.readers import read_scan
 from pipeline.surface.scan import Scan
 
 NY, NX = 10, 12
@@ -43,3 +46,12 @@ def check(scan: Scan, void: bool, um: float, pitch: tuple[float, float]) -> None
     found = scan.heights * scan.um_per_unit
     np.testing.assert_allclose(found - np.nanmin(found), expected - np.nanmin(expected), rtol=2e-5, atol=1e-9)
     assert scan.pitch_um == pytest.approx(pitch, rel=1e-5)
+
+
+def check_cut(path: Path, data: bytes, kept: float) -> None:
+    """A file of which only a share is kept is refused in one line that begins with its name."""
+    path.write_bytes(data[: int(kept * len(data))])
+    with pytest.raises(InputError) as caught:
+        read_scan(path, None)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(f"{path.name}: expected ")

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.errors import InputError
 from pipeline.surface.readers import read_scan
-from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, VOID, check, packed
+from tests.surface.asymmetric import NX, NY, PITCH_UM, TOP_FIRST, VOID, check, check_cut, packed
 
 pytestmark = pytest.mark.usefixtures("surface_topography")
 
@@ -224,9 +223,4 @@ def test_file(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("kept", [0.9, 0.5])
 def test_a_cut_file_is_one_line(tmp_path: Path, name: str, kept: float) -> None:
-    data = FILES[name][0]()
-    (tmp_path / name).write_bytes(data[: int(kept * len(data))])
-    with pytest.raises(InputError) as caught:
-        read_scan(tmp_path / name, None)
-    assert "\n" not in str(caught.value)
-    assert str(caught.value).startswith(f"{name}: expected ")
+    check_cut(tmp_path / name, FILES[name][0](), kept)

@@ -1,4 +1,4 @@
-"""How cost grows with the scan: seconds and peak memory of each stage, from scan to certified table, over its size.
+"""Growth of cost with the scan: seconds and peak memory of each stage, from scan to certified table, over its size.
 
 The surfaces are `gaussian` recipes of one pitch, as fine as a snake's scan. The window is the default one, four sigma
 wide at most; a patch that does not hold it has a window as wide as itself.
@@ -19,6 +19,7 @@ from pipeline.evaluation.speed.processes import RunFailedError
 from pipeline.evaluation.speed.stage_costs import BakeCost
 from pipeline.optics.coherence import Coherence
 from pipeline.progress import Progress, silent
+from pipeline.resources import MIB
 from pipeline.store import scratch
 from pipeline.surface import recipes, windows
 from pipeline.surface.recipes.parameters import GaussianRandom
@@ -32,13 +33,10 @@ COLUMNS = (
     *("side", "size_um", "sigma_um", "windows", "growth", "process_s"),
     *(f"{stage}_{of}" for stage in STAGES for of in ("s", "mib", "predicted_mib")),
 )
-# a window holds four sigma, as in `pipeline.surface.windows`
-_WIDTH_SIGMAS = 4.0
 # larger scans are baked once: they take long enough for a steady time
 _REPEATED = 2048
 # a scan file repeats a smaller patch, which is periodic
 _TILE = 1024
-_MIB = 2.0**20
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,7 @@ def growth(before: BakeCost, before_side: int, after: BakeCost, after_side: int)
 
 def _config(side: int, surface: SurfaceSource) -> Config:
     default = Coherence().sigma_um
-    sigma_um = min(default, side * PITCH_UM / _WIDTH_SIGMAS)
+    sigma_um = min(default, side * PITCH_UM / windows.WIDTH_SIGMAS)
     return Config(name=f"gaussian{side}", surface=surface, coherence=Coherence(sigma_um=sigma_um))
 
 
@@ -162,6 +160,6 @@ def _row(size: ScanCost) -> dict[str, Any]:
     row |= {"windows": size.windows, "process_s": size.cost.seconds, "growth": size.growth}
     for stage in size.cost.stages:
         row[f"{stage.stage}_s"] = stage.seconds
-        row[f"{stage.stage}_mib"] = stage.peak_bytes / _MIB
-        row[f"{stage.stage}_predicted_mib"] = stage.predicted_bytes / _MIB
+        row[f"{stage.stage}_mib"] = stage.peak_bytes / MIB
+        row[f"{stage.stage}_predicted_mib"] = stage.predicted_bytes / MIB
     return row
