@@ -11,6 +11,8 @@ from kernels.polar_power_spectrum import LANES
 from kernels.programs import CHANNELS, ORDER
 from kernels.windowed_dft import fourth_column
 
+_LEAST_SPAN = 1e-9  # of |w|, where a ring has one value: T_k of the middle then
+
 
 @dataclass(frozen=True)
 class RingQuadratures:
@@ -60,9 +62,36 @@ class LinePoints:
         """The first ring of every group, (groups,)."""
         return np.asarray(np.cumsum(self.rings) - self.rings)
 
-    def reach(self, rho: np.ndarray) -> np.ndarray:
-        """|w| of every ring where its group's line ends, (rings,): at the first ring's w_max."""
-        return np.asarray(self.stretch * w_max(rho)[self.first_ring][self.group])
+    def scaled(self, of_group: np.ndarray) -> np.ndarray:
+        """|w| of every ring (rings, ...) where its group's first ring has the |w| `of_group` (groups, ...)."""
+        stretch = self.stretch.reshape(-1, *(1,) * (of_group.ndim - 1))
+        return np.asarray(stretch * of_group[self.group])
+
+
+@dataclass(frozen=True)
+class Span:
+    """The interval of |w| of the nodes of every group, as that of its first ring.
+
+    low, high: (groups,).
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+    def nodes(self, w_terms: int) -> np.ndarray:
+        """Chebyshev's nodes w_m of every group, (groups, w_terms)."""
+        return self.low[:, None] + np.outer(self.high - self.low, w_nodes(w_terms))
+
+
+def whole_span(rho: np.ndarray, points: LinePoints) -> Span:
+    """All |w| of the first ring `rho` (rings,) of every group."""
+    high = w_max(rho)[points.first_ring]
+    return Span(np.zeros_like(high), high)
+
+
+def half_turns(tiles: int) -> np.ndarray:
+    """Pairs (tiles / 2, 2) of all `tiles` tiles of E with those half a turn on."""
+    return np.arange(tiles).reshape(2, -1).T
 
 
 def integrate(
@@ -79,14 +108,72 @@ def integrate(
     `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,). `reflectance` (nodes of all rings'
     rules one after the other, w_terms) multiplies E at `group_w`; w_terms is a multiple of 4.
     """
-    tiles, radii, s_nodes, _ = spectrum.shape
+    span, w_terms = whole_span(rho, points), reflectance.shape[1]
+    pairs, to_w_terms = half_turns(len(spectrum)), _to_w_terms(rho, points, w_terms)
+    of = radius_per_um, s_max_per_um, rho, points, quadratures, reflectance
+    return _apply(spectrum, pairs, *of, span, to_w_terms, None)
+
+
+def integrate_at(
+    spectrum: np.ndarray,
+    pairs: np.ndarray,
+    radius_per_um: np.ndarray,
+    s_max_per_um: float,
+    rho: np.ndarray,
+    points: LinePoints,
+    quadratures: RingQuadratures,
+    reflectance: np.ndarray,
+    span: Span,
+    w: np.ndarray,
+) -> np.ndarray:
+    """X, Y, Z at one |w| of each texel: float32 (rings, 3, azimuths), from E, at the azimuths of some of its tiles.
+
+    `pairs` (pairs, 2) are the places in E of the tiles; the azimuths of their first column come first in the result.
+    Where a ring takes radii below 0, they are half a turn apart. `span` is the interval of the nodes in |w|, and `w`
+    (rings, azimuths) within it for every ring; other parameters are as in `integrate`.
+    """
+    w_terms = reflectance.shape[1]
+    to_terms = np.broadcast_to(chebyshev(w_terms)[0], (len(rho), w_terms, w_terms))
+    low, high = points.scaled(span.low), points.scaled(span.high)
+    own_x = (2.0 * (w - low[:, None]) / np.maximum(high - low, _LEAST_SPAN)[:, None] - 1.0).astype(np.float32)
+    of = radius_per_um, s_max_per_um, rho, points, quadratures, reflectance
+    return _apply(spectrum, pairs, *of, span, to_terms, own_x)
+
+
+def _apply(
+    spectrum: np.ndarray,
+    pairs: np.ndarray,
+    radius_per_um: np.ndarray,
+    s_max_per_um: float,
+    rho: np.ndarray,
+    points: LinePoints,
+    quadratures: RingQuadratures,
+    reflectance: np.ndarray,
+    span: Span,
+    to_w_terms: np.ndarray,
+    own_x: np.ndarray | None,
+) -> np.ndarray:
+    """Runs both kernels; `own_x` is the argument of T_k of each texel, None for all terms."""
+    _, radii, s_nodes, _ = spectrum.shape
     w_terms, rings = reflectance.shape[1], len(rho)
-    program, operator = _operator(radius_per_um, s_nodes, s_max_per_um, rho, points, quadratures, reflectance)
-    to_w_terms = device.upload(_to_w_terms(rho, points, w_terms).astype(np.float32))
-    out = device.empty((rings, CHANNELS * w_terms, LANES * tiles), np.float32)
+    program, operator = _operator(radius_per_um, s_nodes, s_max_per_um, rho, points, quadratures, reflectance, span)
+    out = device.empty((rings, CHANNELS * (w_terms if own_x is None else 1), LANES * pairs.size), np.float32)
     power, result = device.lent(spectrum), device.shared(out)
-    size, sizes = (len(points.rings), tiles // 2), (np.int32(s_nodes), np.int32(w_terms))
-    program.launch("apply_operator", size, power, np.int32(radii), *operator, *sizes, to_w_terms, result)
+    at = device.upload(np.zeros(1, np.float32) if own_x is None else own_x)
+    program.launch(
+        "apply_operator",
+        (len(points.rings), len(pairs)),
+        power,
+        np.int32(radii),
+        device.upload(pairs.astype(np.int32)),
+        *operator,
+        np.int32(s_nodes),
+        np.int32(w_terms),
+        device.upload(to_w_terms.astype(np.float32)),
+        np.int32(own_x is not None),
+        at,
+        result,
+    )
     return device.settle(result, out)
 
 
@@ -98,6 +185,7 @@ def _operator(
     points: LinePoints,
     quadratures: RingQuadratures,
     reflectance: np.ndarray,
+    span: Span,
 ) -> tuple[device.Program, list[Any]]:
     """The program, and the operator of every group from E on `s_nodes`, on the device, in the kernels' order."""
     w_terms = reflectance.shape[1]
@@ -114,7 +202,7 @@ def _operator(
             fourth_column(quadratures.weights).astype(np.float32),
             reflectance.astype(np.float32, copy=False),
             chebyshev(s_nodes)[0].astype(np.float32),
-            w_nodes(w_terms).astype(np.float32),
+            span.nodes(w_terms).astype(np.float32),
         )
     ]
     count, ring_points = len(points.place), int(points.rings @ points.count)
@@ -149,7 +237,7 @@ def _rings(points: LinePoints, quadratures: RingQuadratures) -> np.ndarray:
 def _to_w_terms(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
     """Chebyshev coefficients over every ring's w from values at its group's nodes, (rings, w_terms, w_terms)."""
     to_terms, x = chebyshev(w_terms)
-    reach = points.reach(rho)
+    reach = points.scaled(whole_span(rho, points).high)
     # at the rim all nodes are one
     share = np.divide(w_max(rho), reach, out=np.ones_like(rho), where=reach > 0.0)
     own = share[:, None] * (x + 1.0) - 1.0
@@ -157,6 +245,6 @@ def _to_w_terms(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray
     return np.asarray(to_terms @ through)
 
 
-def group_w(rho: np.ndarray, points: LinePoints, w_terms: int) -> np.ndarray:
+def group_w(points: LinePoints, span: Span, w_terms: int) -> np.ndarray:
     """|w| of every ring where its group takes E, (rings, w_terms); beyond a ring's own w_max it goes on."""
-    return np.outer(points.reach(rho), w_nodes(w_terms))
+    return points.scaled(span.nodes(w_terms))

@@ -34,7 +34,7 @@
  *   reflectance    float[...][w_terms]                1     of the material, at each wavelength of a ring and each node
  *                                                           w_m of its group; 1 outside metals
  *   to_series      float[s_nodes][s_nodes]            1     C_j = sum_k to_series[k][j] T_k
- *   w_node         float[w_terms]                     1     w_m over the first ring's w_max, in [0, 1]
+ *   w_node         float[groups][w_terms]             1     w_m, |w| of the group's first ring
  *   s_max          float                              1/um  where the nodes of E in s end
  *   s_nodes        int                                1     nodes of E in s
  *   w_terms        int                                1     nodes w_m; a multiple of W_LANES
@@ -45,8 +45,10 @@
  *                                                           from, and the one after the last
  *
  * apply_operator
- *   spectrum       float[HALVES * tiles][radii][s_nodes][LANES]   1   E, as polar_power_spectrum.cl writes it
+ *   spectrum       float[...][radii][s_nodes][LANES]  1     E, as polar_power_spectrum.cl writes it
  *   radii          int                                1     of E
+ *   pairs          int2[tiles]                        1     where a tile of azimuths and the one that is made with it
+ *                                                           lie in E: half a turn on where a ring takes radii below 0
  *   groups         Group[groups]                      1     as of build_operator
  *   rings          Ring[rings]                        1     as of build_operator
  *   first_radius   int[points]                        1     as of build_operator
@@ -58,7 +60,9 @@
  *   w_terms        int                                1     nodes w_m, and terms of the table
  *   to_w_terms     float[rings][w_terms][w_terms]     1     Chebyshev coefficients over a ring's w from values at its
  *                                                           group's nodes, [term][node]
- *   table          float[rings][CHANNELS][w_terms][HALVES * tiles][LANES]   1   result
+ *   is_summed      int                                1     whether the terms are summed at one w of each texel
+ *   own_x          float[rings][HALVES * tiles][LANES]   1  argument of T_k at that w; unread where they are not
+ *   table          float[rings][CHANNELS][w_terms][HALVES * tiles][LANES]   1   result; w_terms is 1 where summed
  *
  * Set by the host: LANES, 16, azimuths of a tile; ORDER (even); MOST_RINGS of a group; MOST_S_NODES and MOST_W_TERMS,
  * which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in registers; XYZ_HALVES (1 or
@@ -172,13 +176,13 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
                              __global int2 *used) {
     const Group group = groups[get_global_id(0)];
     const double first_rho = rho[group.ring];
-    const float w_max = sqrt(fmax(4.0 - first_rho * first_rho, 0.0));
+    __global const float *own_w = w_node + (long)get_global_id(0) * w_terms;
 
     ROLLED for (int p = group.first; p < group.first + group.points; ++p) {
         if (!group.on_radii) radial_weights(radius, first_radius[p], first_rho * kappa[p], lagrange_r + p * ORDER);
         /* s = 2 pi |w| kappa, and 2 s / s_max - 1 is the argument of T_k */
-        const float scale = 2.0f * 2.0f * (float)M_PI * w_max * (float)kappa[p] / s_max;
-        cardinal_functions(scale, w_node, to_series, s_nodes, w_terms, cardinal_s + (long)p * s_nodes * w_terms);
+        const float scale = 2.0f * 2.0f * (float)M_PI * (float)kappa[p] / s_max;
+        cardinal_functions(scale, own_w, to_series, s_nodes, w_terms, cardinal_s + (long)p * s_nodes * w_terms);
     }
     ROLLED for (int i = group.ring; i < group.ring + group.rings; ++i)
         sum_point_weights(group, rings[i], stretch[i], kappa + group.first, lambda_um, weights, reflectance, w_terms,
@@ -289,15 +293,38 @@ static APART void write_terms(const float16 (*xyz)[HALVES], __global const float
         }
 }
 
-__kernel void apply_operator(__global const float *spectrum, const int radii, __global const Group *groups,
-                             __global const Ring *rings, __global const int *first_radius,
+/* A ring's X, Y, Z at one w of each texel, from those at its group's nodes. */
+static APART void write_values(const float16 (*xyz)[HALVES], __global const float *to_w_terms, const int w_terms,
+                               __global const float *own_x, const int tile, const int tiles, __global float *ring) {
+    ROLLED for (int h = 0; h < HALVES; ++h) {
+        const float16 x = vload16(tile + h * tiles, own_x);
+        float16 sum[CHANNELS] = {0.0f, 0.0f, 0.0f}, before = x, T = 1.0f;
+        ROLLED for (int k = 0; k < w_terms; ++k) {
+            ROLLED for (int c = 0; c < CHANNELS; ++c) {
+                float16 term = 0.0f;
+                ROLLED for (int m = 0; m < w_terms; ++m)
+                    term = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][h], term);
+                sum[c] = fma(T, term, sum[c]);
+            }
+            /* T_(-1) = T_1 = x */
+            const float16 next = 2.0f * x * T - before;
+            before = T;
+            T = next;
+        }
+        ROLLED for (int c = 0; c < CHANNELS; ++c) vstore16(sum[c], (c * HALVES + h) * tiles + tile, ring);
+    }
+}
+
+__kernel void apply_operator(__global const float *spectrum, const int radii, __global const int2 *pairs,
+                             __global const Group *groups, __global const Ring *rings, __global const int *first_radius,
                              __global const float *lagrange_r, __global const float *cardinal_s,
                              __global const float *point_weights, __global const int2 *used, const int s_nodes,
-                             const int w_terms, __global const float *to_w_terms, __global float *table) {
+                             const int w_terms, __global const float *to_w_terms, const int is_summed,
+                             __global const float *own_x, __global float *table) {
     const Group group = groups[get_global_id(0)];
     const int tile = get_global_id(1), tiles = get_global_size(1), sums = CHANNELS * w_terms;
-    __global const float *here = spectrum + (long)tile * radii * s_nodes * LANES;
-    __global const float *opposite = here + (long)tiles * radii * s_nodes * LANES;
+    __global const float *here = spectrum + (long)pairs[tile].x * radii * s_nodes * LANES;
+    __global const float *opposite = spectrum + (long)pairs[tile].y * radii * s_nodes * LANES;
 
     float16 xyz[MOST_RINGS * CHANNELS * MOST_W_TERMS][HALVES], g[CHUNK * MOST_W_TERMS][HALVES];
     ROLLED for (int q = 0; q < group.rings * sums; ++q) xyz[q][0] = xyz[q][1] = 0.0f;
@@ -314,8 +341,12 @@ __kernel void apply_operator(__global const float *spectrum, const int radii, __
         }
     }
     ROLLED for (int i = 0; i < group.rings; ++i) {
-        const long ring = group.ring + i;
-        write_terms(xyz + i * sums, to_w_terms + ring * w_terms * w_terms, w_terms, tile, tiles,
-                    table + ring * sums * HALVES * tiles * LANES);
+        const long ring = group.ring + i, azimuths = HALVES * tiles * LANES;
+        __global const float *own = to_w_terms + ring * w_terms * w_terms;
+        if (is_summed)
+            write_values(xyz + i * sums, own, w_terms, own_x + ring * azimuths, tile, tiles,
+                         table + ring * CHANNELS * azimuths);
+        else
+            write_terms(xyz + i * sums, own, w_terms, tile, tiles, table + ring * sums * azimuths);
     }
 }

@@ -46,7 +46,8 @@ def integrate(
         4 * len(points.place) * s_nodes * w_terms,
         "lower the heights (a scan's outliers: surface.clip_percentile) or raise accuracy.delta_e",
     )
-    reflected = at_nodes(reflectance, rho, spectral_operator.group_w(rho, points, w_terms), quadratures)
+    span = spectral_operator.whole_span(rho, points)
+    reflected = at_nodes(reflectance, rho, spectral_operator.group_w(points, span, w_terms), quadratures)
     terms = spectral_operator.integrate(power, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
     return terms.reshape(len(rho), 3, w_terms, -1)
 

@@ -152,6 +152,15 @@ def choose(trial: Trial, scene: Scene | None, budget: Budget, layout: PolarLayou
     return Plan(bake.terms, bake.s_nodes, bake.w_terms, azimuths, rings, error)
 
 
+def w_terms_within(half_width: float, half_range_um: float, light: Light, budget: Budget, layout: PolarLayout) -> int:
+    """Computes the number of nodes in |w| for an interval of `half_width`, a multiple of 4.
+
+    half_range_um: half of the height range, um. light, budget, layout: as in `start`.
+    """
+    probing = _probing_light(light, layout)
+    return _w_terms(half_width * expansion.largest_phase(half_range_um, probing.middle_nm), probing, budget)
+
+
 def _w_terms(phase: float, light: Light, budget: Budget) -> int:
     """Computes the number of terms in |w|, a multiple of 4, for a phase k |w| H at the luminous middle.
 

@@ -1,0 +1,240 @@
+"""Tables of a flat sample under one directional light, baked tile by tile.
+
+Under one light, (u, v) determines the view and so |w| = cos(ti) + cos(tr). A texel then holds one value for each of
+X, Y and Z instead of a polynomial in |w|, and one value in all under a laser line, whose X and Z are constant
+multiples of Y. A tile depends on its grid, its light and the material alone, never on the tiles that are baked with
+it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import cubic_spline, spectral_operator
+from kernels.programs import LANES, ORDER
+from kernels.spectral_operator import LinePoints, RingQuadratures, Span
+from pipeline.arrays import Array
+from pipeline.diffraction import power_spectrum
+from pipeline.diffraction.dft_stack import Stack
+from pipeline.diffraction.polar_grid import PolarGrid
+from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
+from pipeline.optics.brdf import Radiometry, geometry_factor
+from pipeline.surface.windows import MIDDLE, Places
+from pipeline.tables.polar import line_points
+from pipeline.tables.polar.bake import PolarBake
+from pipeline.tables.polar.reach import known_cells, smooth_w_of, w_of
+from pipeline.tables.polar.spectral_integral import at_nodes
+
+_VECTORS = AZIMUTHS // LANES  # of a sector
+# radii of E beyond those of a band's wavelengths, for Lagrange's polynomials
+_SPARE_RADII = ORDER
+# largest difference of |w| at which a direction belongs to the light of a table
+_SAME_W = 1e-4
+
+# samples of tiles by band and sector, float32 (rings of the band, channels, AZIMUTHS)
+Samples = dict[tuple[int, int], NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class LitBake:
+    """The bake of tiles for one light.
+
+    bake: the settings, whose w_terms are not read. grid: the texels. wi: unit vector towards the light (3,).
+    w_terms: computes the number of nodes in |w| for half the width of an interval.
+    """
+
+    bake: PolarBake
+    grid: PolarGrid
+    wi: Array
+    w_terms: Callable[[float], int]
+
+    @cached_property
+    def rules(self) -> RingQuadratures:
+        """Wavelengths of all rings of the grid."""
+        return self.bake.rules(self.grid.rings.rho())
+
+    @property
+    def primaries(self) -> Array:
+        """XYZ of one unit of every channel, (channels, 3): Y alone is stored for a laser line."""
+        if not self.bake.radiometry.light.is_line:
+            return np.eye(3)
+        weights = self.bake.radiometry.illumination(1.0).weights
+        return weights / weights[:, 1:2]
+
+    def radii(self, of_bands: NDArray[np.intp]) -> slice:
+        """Returns the radii of E that bands need, as a part of `PolarBake.radius_per_um`."""
+        radius, rho = self.bake.radius_per_um, self.grid.rings.rho()
+        first, last = rho[RINGS * of_bands[0]], rho[min(RINGS * (of_bands[-1] + 1), len(rho)) - 1]
+        low, high = self.rules.kappa_ends_per_um
+        start, stop = np.searchsorted(radius, [first * low.min(), last * high.max()])
+        return slice(max(0, int(start) - _SPARE_RADII), min(len(radius), int(stop) + _SPARE_RADII))
+
+    def samples(self, stack: Stack, missing: NDArray[np.bool_], places: Places = MIDDLE) -> Samples:
+        """Computes the samples of tiles.
+
+        stack: of the coherence window. missing: the tiles to bake (bands, sectors). places: positions of the window.
+        Raises DeviceError if no device works.
+        """
+        if not missing.any():
+            return {}
+        radii = self.radii(np.flatnonzero(missing.any(axis=1)))
+        half = self.grid.azimuths.count // (2 * LANES)
+        vectors = np.unique(_vectors(np.flatnonzero(missing.any(axis=0))) % half)
+        phi = self.grid.azimuths.phi().reshape(-1, LANES)[vectors].ravel()
+        radius = self.bake.radius_per_um[radii]
+        lambda_min, nodes = self.bake.lambda_min_nm, self.bake.s_nodes
+        values = power_spectrum.gather(stack, phi, radius, lambda_min, nodes, places)
+        at = np.full(2 * half, -1)
+        at[vectors], at[vectors + half] = np.arange(len(vectors)), len(vectors) + np.arange(len(vectors))
+        found: Samples = {}
+        for band in np.flatnonzero(missing.any(axis=1)):
+            found |= self._band(int(band), np.flatnonzero(missing[band]), values, radius, at)
+        return found
+
+    def _band(
+        self,
+        band: int,
+        sectors: NDArray[np.intp],
+        values: NDArray[np.float32],
+        radius: Array,
+        at: NDArray[np.intp],
+    ) -> Samples:
+        """Integrates E (values) on some of its radii over wavelengths, for the tiles of one band.
+
+        at: where in E the vectors of azimuths of the whole turn lie.
+        """
+        rings = slice(RINGS * band, min(RINGS * (band + 1), self.grid.rings.count))
+        rho, rules = self.grid.rings.rho()[rings], _of_rings(self.rules, rings)
+        s_max = power_spectrum.s_max(self.bake.lambda_min_nm)
+        points = line_points.choose(radius, self.bake.s_nodes, s_max, rho, rules)
+        wanted = _vectors(sectors)
+        vectors = _paired(wanted, len(at) // 2) if (points.place < 0).any() else wanted.reshape(2, -1)
+        azimuths = (LANES * vectors.ravel()[:, None] + np.arange(LANES)).ravel()
+        w = self._w(rho, azimuths)
+        span = _span(self._w(rho, np.arange(self.grid.azimuths.count)), points)
+        w_terms = self.w_terms(0.5 * float(np.max(span.high - span.low)))
+        within = spectral_operator.group_w(points, span, w_terms)
+        reflected = at_nodes(self.bake.radiometry.reflectance, rho, within, rules)
+        of = radius, s_max, rho, points, rules, reflected, span, w
+        xyz = spectral_operator.integrate_at(values, at[vectors].T, *of)
+        kept = xyz[:, 1:2] if self.bake.radiometry.light.is_line else xyz
+        place = np.empty(len(at), int)
+        place[vectors.ravel()] = np.arange(vectors.size)
+        by_vector = kept.reshape(*kept.shape[:2], -1, LANES)
+        return {
+            (band, int(k)): by_vector[:, :, place[_vectors(np.array([k]))]].reshape(*kept.shape[:2], AZIMUTHS)
+            for k in sectors
+        }
+
+    def _w(self, rho: Array, azimuths: NDArray[np.intp]) -> Array:
+        """Computes |w| of the light at rings `rho` (n_rings,) and azimuths by index, (n_rings, azimuths)."""
+        phi = self.grid.azimuths.phi()[azimuths]
+        uv = np.stack([np.outer(rho, np.cos(phi)), np.outer(rho, np.sin(phi))], axis=-1)
+        return smooth_w_of(self.wi, uv, self.grid.rings.step)
+
+
+@dataclass(frozen=True)
+class LitTable:
+    """A table under one light: coefficients of bicubic B-splines, and what they cover.
+
+    values: float32 (rings, channels, azimuths), to the last covered band; repeated from the nearest covered texel
+    where no tile is. tiles: those that were baked. primaries: XYZ of one unit of every channel (channels, 3).
+    wi: unit vector towards the light (3,).
+    """
+
+    values: NDArray[np.float32]
+    tiles: Tiles
+    primaries: Array
+    wi: Array
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the samples of all tiles."""
+        return 4 * self.tiles.texels * len(self.primaries)
+
+    @cached_property
+    def _known(self) -> NDArray[np.bool_]:
+        return known_cells(self.tiles)
+
+    def look_up(self, uvw: Array) -> Array:
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3).
+
+        NaN where no tile covers the look-up, and where |w| is not that of the light.
+        """
+        grid, uv = self.tiles.grid, uvw[:, :2]
+        ring = np.clip(grid.rings.ring_from_rho(np.hypot(uv[:, 0], uv[:, 1])), 0.0, grid.rings.count - 1.0)
+        azimuth = grid.azimuths.azimuth_from_uv(uv)
+        known = self._known[ring.astype(int), azimuth.astype(int)]
+        known &= np.abs(np.abs(uvw[:, 2]) - w_of(self.wi, uv)) <= _SAME_W
+        xyz = np.einsum("rca,cx->rxa", self.values, self.primaries.astype(np.float32))
+        found = cubic_spline.look_up(xyz, np.minimum(ring, len(xyz) - 1.0), azimuth, np.zeros(len(uvw)))
+        return np.asarray(np.where(known[:, None], found.astype(np.float64), np.nan))
+
+    def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+        """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3), as a polar table does."""
+        if radiometry.material.fresnel == "conductor":
+            return geometry_factor(radiometry.material, wi, wr)
+        return radiometry.direction_factor(wi, wr)
+
+
+def assemble(samples: Mapping[tuple[int, int], NDArray[np.float32]], tiles: Tiles, lit: LitBake) -> LitTable:
+    """Puts splines through the samples of tiles.
+
+    samples: of all covered tiles, by band and sector. tiles: which these are. lit: the bake of their light.
+    """
+    grid = tiles.grid
+    last = int(np.flatnonzero(tiles.covered.any(axis=1))[-1])
+    rings = min(RINGS * (last + 1), grid.rings.count)
+    values = np.empty((rings, len(lit.primaries), grid.azimuths.count), np.float32)
+    for (band, sector), tile in samples.items():
+        values[RINGS * band : RINGS * band + len(tile), :, AZIMUTHS * sector : AZIMUTHS * (sector + 1)] = tile
+    _fill(values, tiles.covered[: last + 1])
+    return LitTable(cubic_spline.coefficients(values), tiles, lit.primaries, lit.wi)
+
+
+def _fill(values: NDArray[np.float32], covered: NDArray[np.bool_]) -> None:
+    """Continues samples (rings, channels, azimuths) into tiles that are not covered, from the nearest that is."""
+    by_band = [slice(RINGS * b, min(RINGS * (b + 1), len(values))) for b in range(len(covered))]
+    filled, turn = covered.any(axis=1), covered.shape[1]
+    for band in np.flatnonzero(filled & ~covered.all(axis=1)):
+        have = np.flatnonzero(covered[band])
+        for sector in np.flatnonzero(~covered[band]):
+            # the turn is periodic
+            away = (have - sector + turn // 2) % turn - turn // 2
+            nearest = int(away[np.argmin(np.abs(away))])
+            end = AZIMUTHS * ((sector + nearest) % turn) + (0 if nearest > 0 else AZIMUTHS - 1)
+            part = values[by_band[band]]
+            part[:, :, AZIMUTHS * sector : AZIMUTHS * (sector + 1)] = part[:, :, end : end + 1]
+    have = np.flatnonzero(filled)
+    for band in np.flatnonzero(~filled):
+        nearest = int(have[np.argmin(np.abs(have - band))])
+        ring = by_band[nearest].start if nearest > band else by_band[nearest].stop - 1
+        values[by_band[band]] = values[ring]
+
+
+def _vectors(of_sectors: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Lists the vectors of LANES azimuths of sectors."""
+    return np.asarray((_VECTORS * of_sectors[:, None] + np.arange(_VECTORS)).ravel())
+
+
+def _paired(vectors: NDArray[np.intp], half: int) -> NDArray[np.intp]:
+    """Pairs vectors of azimuths with those half a turn on, (2, pairs); half: vectors of half a turn."""
+    first = np.unique(vectors % half)
+    return np.stack([first, first + half])
+
+
+def _of_rings(rules: RingQuadratures, rings: slice) -> RingQuadratures:
+    return RingQuadratures(rules.lambda_um, rules.weights, rules.first[rings], rules.count[rings])
+
+
+def _span(w: Array, points: LinePoints) -> Span:
+    """Finds the interval of |w| of the first ring of every group that serves all its rings.
+
+    w: |w| of the rings (rings, azimuths).
+    """
+    stretch = points.stretch[:, None]
+    low, high = (w / stretch).min(axis=1), (w / stretch).max(axis=1)
+    return Span(np.minimum.reduceat(low, points.first_ring), np.maximum.reduceat(high, points.first_ring))
