@@ -14,13 +14,14 @@ from cli import console, sources
 if TYPE_CHECKING:
     from pipeline.evaluation.check import Check
     from pipeline.evaluation.figures.bench import FigureResults
+    from pipeline.evaluation.scenes.bench import SceneResults
     from pipeline.evaluation.speed.bench import SpeedResults
     from pipeline.evaluation.speed.growth import GrowthCurve
     from pipeline.evaluation.speed.stage_costs import StageCost
     from pipeline.evaluation.speed.suite import Point, SurfaceSpeed
     from pipeline.evaluation.stability.bench import StabilityResults
 
-    Results = SpeedResults | StabilityResults | FigureResults
+    Results = SpeedResults | StabilityResults | FigureResults | SceneResults
 
 # starts the tool in a process of its own; -P: nothing is imported from the working folder
 COMMAND_LINE = (sys.executable, "-P", "-c", "from cli.entry import process; process()")
@@ -64,6 +65,32 @@ def speed_command(
             found = bench.run(configs, quick, store, COMMAND_LINE, progress, console.note)
     if written := _write(found, out, as_json):
         _print_speed(found)
+        for path in written:
+            console.say(path)
+
+
+@bench_command.command("scene")
+@click.argument("config_paths", metavar="[CONFIG]...", type=click.Path(path_type=Path), nargs=-1)
+@_out_option("out/scene", "scene.json")
+@console.json_option
+def scene_command(config_paths: tuple[Path, ...], out: Path, as_json: bool) -> None:
+    """Measure what a scene saves of CONFIGs' bakes, and that it changes no value.
+
+    Kernels' time, bytes and error of a fixed normal light and of a laser line at 45 degrees on a screen of 60 x 60
+    degrees, beside the full bake's; and the tiles that are baked when a scene changes. Without CONFIGs: three
+    synthetic surfaces.
+    """
+    from pipeline.evaluation.scenes import bench
+    from pipeline.evaluation.speed.bench import built_in
+    from pipeline.store import scratch
+
+    scratch.require_folder(out)
+    with nullcontext(config_paths) if config_paths else built_in() as paths:
+        configs = [(sources.load(path), path) for path in paths]
+        with console.showing_progress() as progress:
+            found = bench.run(configs, progress, console.note)
+    if written := _write(found, out, as_json):
+        _print_scene(found)
         for path in written:
             console.say(path)
 
@@ -152,6 +179,24 @@ def _print_checks(checks: "Sequence[Check]") -> None:
             "of": lambda check: f"{check.what}: {check.remark}" if check.remark else check.what,
         },
     )
+
+
+def _print_scene(found: "SceneResults") -> None:
+    """The cost of every table, and the checks."""
+    for surface in found.surfaces:
+        console.say("")
+        console.say(surface.name)
+        _print_rows(
+            surface.costs.items(),
+            {
+                "table": lambda row: row[0],
+                "kernels": lambda row: _ms(row[1].kernel_s),
+                "bytes": lambda row: f"{row[1].bytes / 1e6:.2f} MB",
+                "tiles": lambda row: f"{row[1].tiles} of {row[1].of_tiles}",
+            },
+        )
+    console.say("")
+    _print_checks(found.checks)
 
 
 def _ms(seconds: float) -> str:

@@ -18,11 +18,15 @@ def store_command() -> None:
 @console.store_option
 @console.json_option
 def list_command(store_root: Path | None, as_json: bool) -> None:
-    """List the artifacts: stage, name, size and address."""
+    """List the artifacts and the tiles of tables: stage, name, size and address."""
     store = console.open_store(store_root)
     found = [
         {"stage": a.stage, "name": a.record.get("name", ""), "bytes": a.bytes, "key": a.key}
         for a in store.artifacts()
+    ]
+    found += [
+        {"stage": "tiles", "name": f"{len(tiles.files)} tiles", "bytes": tiles.bytes, "key": tiles.key}
+        for tiles in store.tile_folders()
     ]
     if as_json:
         console.print_json({"root": str(store.root), "artifacts": found})
@@ -58,7 +62,7 @@ def check_command(store_root: Path | None, as_json: bool) -> None:
 @console.store_option
 @console.json_option
 def collect_command(unused_days: float | None, store_root: Path | None, as_json: bool) -> None:
-    """Remove damaged artifacts, temporary folders of killed runs, and optionally artifacts that were long unused."""
+    """Remove what is damaged, temporary folders of killed runs, and optionally what was long unused."""
     store = console.open_store(store_root)
     removed, freed = store.collect(unused_days)
     if as_json:

@@ -2,6 +2,7 @@
 
     <root>/<stage>/<key>/artifact.json    stage, key, provenance, and the digest of every file
     <root>/<stage>/<key>/...              files of the artifact
+    <root>/tiles/<key>/...                tiles of tables (tiles.py), each a file of its own
     <root>/tmp/...                        artifacts being written; never read
     <root>/locks/...                      one lock per artifact, so that two runs do not do the same work
 
@@ -26,6 +27,8 @@ from filelock import FileLock
 
 from pipeline.errors import DamagedError, StorageError
 from pipeline.store import digest, files, scratch
+from pipeline.store import tiles as tile_files
+from pipeline.store.tiles import TileFolder
 
 RECORD = "artifact.json"
 FORMAT = 1
@@ -175,10 +178,20 @@ class Store:
 
     def _folders(self) -> list[Path]:
         """Lists what is named like an artifact; the store neither judges nor removes anything else."""
-        return sorted(p for p in self.root.glob("*/*") if _KEY.fullmatch(p.name))
+        found = (p for p in self.root.glob("*/*") if _KEY.fullmatch(p.name))
+        return sorted(p for p in found if p.parent.name != tile_files.FOLDER)
+
+    def tiles(self, key: str) -> TileFolder:
+        """Returns the tiles of an address, whether there are any or not."""
+        return TileFolder(self.root, key)
+
+    def tile_folders(self) -> list[TileFolder]:
+        """Lists the addresses that have tiles."""
+        found = (p for p in self.root.glob(f"{tile_files.FOLDER}/*") if _KEY.fullmatch(p.name))
+        return [self.tiles(p.name) for p in sorted(found) if p.is_dir() and not p.is_symlink()]
 
     def check(self) -> list[str]:
-        """Checks all artifacts; returns one line for each that has changed since it was written."""
+        """Checks all artifacts and tiles; returns one line for each address of which a file has changed."""
         faults = []
         for folder in self._folders():
             try:
@@ -189,13 +202,18 @@ class Store:
                 continue
             if found:
                 faults.append(_damage(folder, found))
+        for tiles in self.tile_folders():
+            if changed := [f"{file.name} was changed" for file in tiles.faults()]:
+                faults.append(_damage(tiles.folder, changed))
         return faults
 
     def collect(self, keep_days: float | None) -> tuple[int, int]:
-        """Removes damaged artifacts, temporary folders of killed runs, and artifacts unused for `keep_days` days.
+        """Removes what is damaged, temporary folders of killed runs, and what was not used for `keep_days` days.
 
-        keep_days: None keeps all artifacts that are not damaged.
-        Returns the number of removed folders and their size in bytes.
+        Of the tiles of an address, those that are damaged are removed, or all where none was used.
+
+        keep_days: None keeps all that is not damaged.
+        Returns the number of removed folders and single files, and their size in bytes.
         """
         now = time.time()
         doomed = [p for p in self.root.glob("tmp/*") if scratch.abandoned(p)]
@@ -206,6 +224,9 @@ class Store:
                 damaged = True
             if damaged or (keep_days is not None and _age_s(folder / RECORD, now) > keep_days * 86400.0):
                 doomed.append(folder)
+        for tiles in self.tile_folders():
+            unused = keep_days is not None and _age_s(tiles.folder, now) > keep_days * 86400.0
+            doomed += [tiles.folder] if unused else tiles.faults()
         freed = sum(_bytes(path) for path in doomed)
         for path in doomed:
             _remove(path)

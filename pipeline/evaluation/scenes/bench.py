@@ -1,0 +1,223 @@
+"""The bench of scenes: kernels' time, bytes and errors of tables of a fixed light, against the full table's.
+
+All tables of a surface and a light have one grid, which is planned without a scene. The full bake is that of the
+config without a scene, for all lights and views.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kernels import device
+from pipeline.accuracy.exact import reference_of
+from pipeline.arrays import Array
+from pipeline.config.models import Config
+from pipeline.evaluation import results
+from pipeline.evaluation.check import Check
+from pipeline.evaluation.figures.screen import LIGHT, Screen
+from pipeline.evaluation.sources import as_published
+from pipeline.evaluation.texts import Texts
+from pipeline.optics import geometry
+from pipeline.optics.colour import delta_e
+from pipeline.optics.light import LaserLine, Light
+from pipeline.optics.random_directions import random_pairs
+from pipeline.optics.scene import Direction, Scene, Views
+from pipeline.progress import Progress
+from pipeline.stages.polar import power_spectrum, scene_tiles
+from pipeline.stages.polar.scene_tiles import Shelf
+from pipeline.stages.surface import field_of
+from pipeline.store import digest, scratch
+from pipeline.store.store import Store
+from pipeline.surface import windows
+from pipeline.surface.heightfield import HeightField
+from pipeline.surface.windows import Places
+from pipeline.tables.evaluate import Table, interpolator
+from pipeline.tables.polar.planning import plan
+from pipeline.tables.polar.planning.plan import Plan
+from pipeline.tables.polar.reach import Reach, of_directions, reach
+from pipeline.tables.polar.table import PolarTable
+
+_NORMAL = Direction(theta_deg=0.0)
+_SECOND = Direction(theta_deg=30.0, phi_deg=180.0)
+_LASER = Light(illuminant=LaserLine(lambda_nm=532.0))
+_SCREEN_DEG, _SCREEN_SAMPLES = 60.0, 1500
+_REPEATS, _DIRECTIONS, _EXPOSURE_RU, _SEED = 5, 2000, 7500.0, 15
+
+
+@dataclass(frozen=True)
+class BakeCost:
+    """The cost of one table: kernels' seconds from heights to samples or coefficients, the shortest of each kernel.
+
+    bytes: of the table. tiles, of_tiles: those that were baked, and those of the grid.
+    """
+
+    kernel_s: float
+    bytes: int
+    tiles: int
+    of_tiles: int
+
+
+@dataclass(frozen=True)
+class SceneCosts:
+    """The costs of one surface, by the name of the table, and the checks that follow from them."""
+
+    name: str
+    costs: dict[str, BakeCost]
+    checks: list[Check]
+
+
+@dataclass(frozen=True)
+class SceneResults:
+    """The results of all surfaces."""
+
+    surfaces: list[SceneCosts]
+
+    @property
+    def checks(self) -> list[Check]:
+        """The checks of all surfaces."""
+        return [check for surface in self.surfaces for check in surface.checks]
+
+    def document(self) -> dict[str, Any]:
+        """Return all results for JSON."""
+        return results.document(self.checks, surfaces={each.name: each.costs for each in self.surfaces})
+
+    def files(self) -> dict[str, str | bytes]:
+        """Return scene.json by name."""
+        return {"scene.json": results.json_text(self.document())}
+
+
+def run(configs: Sequence[tuple[Config, Path]], progress: Progress, note: Callable[[str], None]) -> SceneResults:
+    """Measure all surfaces. note: called with the name of each."""
+    found = []
+    for config, _ in configs:
+        note(f"{config.name}:")
+        found.append(_surface(as_published(config), progress))
+    return SceneResults(found)
+
+
+class _Bench:
+    """A config of one light and no scene, its surface, and its grid and full table."""
+
+    def __init__(self, config: Config, field: HeightField, light: Light) -> None:
+        self.config = config.model_copy(update={"light": light, "scene": None})
+        self.field, self._surface = field, digest.of_json(config.surface.model_dump(mode="json"))
+        self.budget, layout = power_spectrum.budget(self.config), power_spectrum.layout_of(self.config)
+        sigma_um = config.coherence.sigma_um
+        trial = plan.start(field, self.places, sigma_um, light, None, self.budget, layout)
+        self.plan: Plan = plan.choose(trial, None, self.budget, layout)
+        self.full, self.full_cost = _measured(self._full)
+
+    @property
+    def places(self) -> Places:
+        return windows.places(self.field.extent, self.config.coherence)
+
+    def shelf(self, light: Direction) -> Shelf:
+        return scene_tiles.shelf(self.config, self.field, self._surface, self.plan, light)
+
+    def table(self, light: Direction, visited: Reach, store: Store) -> tuple[scene_tiles.Found, BakeCost]:
+        """Return the table of a light, by way of a store, and the cost of its tiles without one."""
+        shelf, tiles = self.shelf(light), visited.tiles()
+        _, kernel_s = _measured(lambda: shelf.bake(tiles.covered))
+        found = scene_tiles.table(store, shelf, tiles)
+        cost = BakeCost(kernel_s, found.table.nbytes, int(tiles.covered.sum()), tiles.covered.size)
+        return found, cost
+
+    def errors(self, table: Table, wi: Array, wr: Array, exact: Array) -> Array:
+        """Return the CIELAB differences of a table from XYZ (directions, 3) at the exposure of all errors here."""
+        unit = self.config.radiometry.unit
+        found = interpolator(table, self.config.radiometry)(wi, wr)
+        return np.asarray(delta_e(np.maximum(found, 0.0) / unit, exact / unit, _EXPOSURE_RU))
+
+    def exact(self, wi: Array, wr: Array, progress: Progress) -> Array:
+        reference = reference_of(self.field, self.config, progress)
+        return reference.xyz(self.config.light, self.config.material, wi, wr)
+
+    def _full(self) -> PolarTable:
+        layout = power_spectrum.layout_of(self.config)
+        bake = self.plan.bake(self.config.radiometry, self.budget, layout)
+        power = bake.power_spectrum(bake.stack(self.field, whole=True), self.plan.azimuths, self.places)
+        return bake.table(power, self.plan.rings, bake.rules(self.plan.rings.rho()))
+
+
+def _measured(work: Callable[[], Any]) -> tuple[Any, float]:
+    """Return the result of `work` and the seconds of its kernels, the least of several runs after one to warm up."""
+    found, least = work(), np.inf
+    for _ in range(_REPEATS):
+        del found
+        with device.default_device().timing() as launches:
+            found = work()
+        least = min(least, sum(launch.seconds for launch in launches))
+    return found, float(least)
+
+
+def _surface(config: Config, progress: Progress) -> SceneCosts:
+    texts, field = Texts(__package__, "scenes", surface=config.name), field_of(config)[0]
+    white, checks = _Bench(config, field, config.light), []
+    grid_tiles = reach(None, white.full.grid).tiles().covered.size
+    full = BakeCost(white.full_cost, white.full.nbytes, grid_tiles, grid_tiles)
+    costs = {"full": full}
+
+    def check(key: str, value: float, remark: str = "", **bound: float) -> None:
+        checks.append(texts.check("{surface}.scene." + key, value, remark=remark, **bound))
+
+    with scratch.temporary() as folder:
+        store = Store(folder)
+        scene = Scene(lights=[_NORMAL])
+        found, costs["normal light"] = white.table(_NORMAL, reach(scene, white.full.grid), store)
+        wi, wr = random_pairs(scene, _DIRECTIONS, _SEED)
+        _check_light(check, "normal", white, found, costs["normal light"], full, (wi, wr), progress)
+        _check_reuse(check, white, store)
+        laser = _Bench(config, field, _LASER)
+        screen = Screen(LIGHT, _SCREEN_SAMPLES, side_mm=200.0 * np.tan(np.radians(0.5 * _SCREEN_DEG)))
+        wi, wr = screen.directions()
+        lit = geometry.above_horizon(wi, wr)
+        visited = of_directions(laser.full.grid, geometry.uvw(wi[lit], wr[lit]))
+        costs["laser, full"] = BakeCost(laser.full_cost, laser.full.nbytes, *2 * (visited.tiles().covered.size,))
+        found, costs["laser on a screen"] = laser.table(LIGHT, visited, store)
+        # 2 degrees above the horizon, as random directions are
+        seen = np.flatnonzero(wr[:, 2] > np.cos(np.radians(88.0)))
+        pick = np.random.default_rng(_SEED).choice(seen, _DIRECTIONS)
+        _check_light(check, "laser", laser, found, costs["laser on a screen"], full, (wi[pick], wr[pick]), progress)
+    return SceneCosts(config.name, costs, checks)
+
+
+def _check_light(
+    check: Callable[..., None],
+    name: str,
+    bench: _Bench,
+    found: scene_tiles.Found,
+    cost: BakeCost,
+    full: BakeCost,
+    pairs: tuple[Array, Array],
+    progress: Progress,
+) -> None:
+    """Check cost, errors and values of one light's table."""
+    budget, exact = bench.budget.delta_e, bench.exact(*pairs, progress)
+    of_full = bench.errors(bench.full, *pairs, exact)
+    of_light = bench.errors(found.table, *pairs, exact)
+    full_xyz = np.maximum(interpolator(bench.full, bench.config.radiometry)(*pairs), 0.0)
+    between = bench.errors(found.table, *pairs, full_xyz)
+    ms = f"{1e3 * cost.kernel_s:.0f} of {1e3 * full.kernel_s:.0f} ms"
+    check(f"{name}_time", cost.kernel_s / full.kernel_s, f"{ms}; {cost.tiles} of {cost.of_tiles} tiles")
+    check(f"{name}_bytes", cost.bytes / full.bytes, f"{cost.bytes / 1e6:.2f} of {full.bytes / 1e6:.1f} MB")
+    check(f"{name}_error", of_light.mean(), f"the full table's {of_full.mean():.3g}", bound=budget)
+    check(f"{name}_difference", between.mean(), f"maximum {between.max():.2g}", bound=budget)
+
+
+def _check_reuse(check: Callable[..., None], bench: _Bench, store: Store) -> None:
+    """Check which tiles are baked when a scene changes."""
+    narrow = Scene(lights=[_SECOND], views=Views(theta_max_deg=20.0))
+    wide, grid = Scene(lights=[_SECOND], views=Views(theta_max_deg=40.0)), bench.full.grid
+    first = scene_tiles.table(store, bench.shelf(_NORMAL), reach(Scene(lights=[_NORMAL]), grid).tiles())
+    tiles = reach(narrow, grid).tiles()
+    second = scene_tiles.table(store, bench.shelf(_SECOND), tiles)
+    check("first_light_again", first.baked, f"the second light's own: {second.baked}")
+    wider = reach(wide, grid).tiles()
+    added = scene_tiles.table(store, bench.shelf(_SECOND), wider)
+    new = int(np.sum(wider.covered & ~tiles.covered))
+    check("wider_views", added.baked - new, f"{added.baked} baked, {int(wider.covered.sum())} covered")
+    back = scene_tiles.table(store, bench.shelf(_SECOND), tiles)
+    check("changed_back", back.baked, f"{int(tiles.covered.sum())} covered")
