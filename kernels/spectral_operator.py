@@ -102,16 +102,18 @@ def integrate(
     points: LinePoints,
     quadratures: RingQuadratures,
     reflectance: np.ndarray,
+    pairs: np.ndarray | None = None,
 ) -> np.ndarray:
     """Chebyshev coefficients over w of X, Y, Z: float32 (rings, 3 w_terms, azimuths), from E.
 
     `s_max_per_um` is where the Chebyshev nodes of E in s end. `rho` (rings,). `reflectance` (nodes of all rings'
-    rules one after the other, w_terms) multiplies E at `group_w`; w_terms is a multiple of 4.
+    rules one after the other, w_terms) multiplies E at `group_w`; w_terms is a multiple of 4. `pairs` (pairs, 2) are
+    the places in E of the tiles that are taken, None for all; the azimuths of their first column come first in the
+    result. Where a ring takes radii below 0, they are half a turn apart.
     """
-    span, w_terms = whole_span(rho, points), reflectance.shape[1]
-    pairs, to_w_terms = half_turns(len(spectrum)), _to_w_terms(rho, points, w_terms)
-    of = radius_per_um, s_max_per_um, rho, points, quadratures, reflectance
-    return _apply(spectrum, pairs, *of, span, to_w_terms, None)
+    to_w_terms = _to_w_terms(rho, points, reflectance.shape[1])
+    of = radius_per_um, s_max_per_um, rho, points, quadratures, reflectance, whole_span(rho, points)
+    return _apply(spectrum, half_turns(len(spectrum)) if pairs is None else pairs, *of, to_w_terms, None)
 
 
 def integrate_at(
@@ -128,9 +130,8 @@ def integrate_at(
 ) -> np.ndarray:
     """X, Y, Z at one |w| of each texel: float32 (rings, 3, azimuths), from E, at the azimuths of some of its tiles.
 
-    `pairs` (pairs, 2) are the places in E of the tiles; the azimuths of their first column come first in the result.
-    Where a ring takes radii below 0, they are half a turn apart. `span` is the interval of the nodes in |w|, and `w`
-    (rings, azimuths) within it for every ring; other parameters are as in `integrate`.
+    `span` is the interval of the nodes in |w|, and `w` (rings, azimuths) within it for every ring; other parameters
+    are as in `integrate`.
     """
     w_terms = reflectance.shape[1]
     to_terms = np.broadcast_to(chebyshev(w_terms)[0], (len(rho), w_terms, w_terms))

@@ -1,4 +1,4 @@
-"""Tables of the lights of a flat scene, from tiles in the store: only those that no run has made are baked."""
+"""The tables of a scene from tiles in the store: only those that no run has made are baked."""
 
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -12,7 +12,8 @@ from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
-from pipeline.optics.scene import Direction
+from pipeline.optics.brdf import Radiometry
+from pipeline.optics.scene import Direction, Scene
 from pipeline.stages.polar import power_spectrum
 from pipeline.stages.stage import kernel_digest, light_parameters, material_parameters
 from pipeline.store import digest
@@ -21,10 +22,10 @@ from pipeline.store.tiles import Place
 from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
-from pipeline.tables.polar.lit import LitBake, LitTable, Samples, assemble
 from pipeline.tables.polar.planning import plan, trial
 from pipeline.tables.polar.planning.plan import Plan
-from pipeline.tables.polar.reach import unit_vector
+from pipeline.tables.polar.reach import reach, unit_vector
+from pipeline.tables.polar.tile_bake import Samples, TileBake, TileTable, assemble
 
 _VERSION = 1
 _KERNELS = ("polar_power_spectrum.cl", "dft_stack.cl", "spectral_operator.cl")
@@ -32,13 +33,13 @@ _KERNELS = ("polar_power_spectrum.cl", "dft_stack.cl", "spectral_operator.cl")
 
 @dataclass(frozen=True)
 class Shelf:
-    """The tiles of one light on a surface.
+    """The tiles of a surface under one light, or of polynomials in |w| for all lights.
 
-    key: their address in the store. lit: the bake. field: the surface. places: positions of the coherence window.
+    key: their address in the store. tile: the bake. field: the surface. places: positions of the coherence window.
     """
 
     key: str
-    lit: LitBake
+    tile: TileBake
     field: HeightField
     places: Places
 
@@ -49,48 +50,99 @@ class Shelf:
         """
         if not missing.any():
             return {}
-        bake, field = self.lit.bake, self.field
-        reach_per_um = float(bake.radius_per_um[self.lit.radii(np.flatnonzero(missing.any(axis=1)))][-1])
+        bake, field = self.tile.bake, self.field
+        reach_per_um = float(bake.radius_per_um[self.tile.radii(np.flatnonzero(missing.any(axis=1)))][-1])
         nearer = replace(bake, rho_max=min(bake.rho_max, reach_per_um * 1e-3 * bake.lambda_min_nm))
         if trial.serves_all(bake, field.extent, self.places):
-            return self.lit.samples(nearer.stack(field, whole=True), missing, self.places)
+            return self.tile.samples(nearer.stack(field, whole=True), missing, self.places)
         seen = dft_stack.samples_seen(field.extent, bake.sigma_um, bake.tolerance)
         mean: Samples = {}
         for place in self.places.pairs():
             stack = nearer.stack(windows.around(field, place, seen))
-            for tile, samples in self.lit.samples(stack, missing).items():
+            for tile, samples in self.tile.samples(stack, missing).items():
                 mean[tile] = mean.get(tile, np.float32(0.0)) + samples / np.float32(self.places.count)
         return mean
 
 
 @dataclass(frozen=True)
 class Found:
-    """The table of one light, and the number of its tiles that were baked for it; others came from the store."""
+    """A table, and the number of its tiles that were baked for it; others came from the store."""
 
-    table: LitTable
+    table: TileTable
     baked: int
 
 
-def shelf(config: Config, field: HeightField, surface_key: str, planned: Plan, light: Direction) -> Shelf:
-    """Returns the shelf of a light.
+@dataclass(frozen=True)
+class SceneTable:
+    """The tables of a scene: one of polynomials in |w|, or one of each light.
+
+    tables: where two lights have the same (u, v) and |w|, they have the same value. baked: how many tiles were baked.
+    """
+
+    tables: tuple[TileTable, ...]
+    baked: int
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the samples of all tables."""
+        return sum(each.nbytes for each in self.tables)
+
+    def look_up(self, uvw: Array) -> Array:
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN where no table has them."""
+        found = self.tables[0].look_up(uvw)
+        for other in self.tables[1:]:
+            unknown = np.isnan(found[:, 0])
+            found[unknown] = other.look_up(uvw[unknown])
+        return found
+
+    def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+        """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3), as a polar table does."""
+        return self.tables[0].direction_factor(radiometry, wi, wr)
+
+
+def scene_table(store: Store, config: Config, field: HeightField, surface_key: str, planned: Plan) -> SceneTable:
+    """Makes the tables that the scene of a config needs, of one light each where these take fewer bytes.
+
+    store: where tiles are read and written. field: the surface, with its address. planned: the plan of a table
+    without a scene. Raises the errors of `table`.
+    """
+
+    def on_shelf(light: Direction | None) -> Shelf:
+        return shelf(config, field, surface_key, planned, light)
+
+    scene, every = config.scene, on_shelf(None)
+    tiles = reach(scene, every.tile.grid).tiles()
+    alone = [] if scene is None else [Scene(lights=[light], views=scene.views) for light in scene.lights]
+    by_light = [(on_shelf(each.lights[0]), reach(each, every.tile.grid).tiles()) for each in alone]
+    bytes_by_light = sum(each.tile.outputs * its.texels for each, its in by_light)
+    if by_light and bytes_by_light < every.tile.outputs * tiles.texels:
+        found = [table(store, each, its) for each, its in by_light]
+    else:
+        found = [table(store, every, tiles)]
+    return SceneTable(tuple(each.table for each in found), sum(each.baked for each in found))
+
+
+def shelf(config: Config, field: HeightField, surface_key: str, planned: Plan, light: Direction | None) -> Shelf:
+    """Returns the shelf of a light, or of polynomials in |w| for all lights.
 
     config: its coherence, light, material and budget are read, and no scene. field: the surface, with its address.
     planned: the plan of a table without a scene.
     """
     budget, layout = power_spectrum.budget(config), power_spectrum.layout_of(config)
-    wi, bake = unit_vector(light), planned.bake(config.radiometry, budget, layout)
+    wi = None if light is None else unit_vector(light)
+    bake = planned.bake(config.radiometry, budget, layout)
     w_terms = partial(
         plan.w_terms_within, half_range_um=field.half_range_um, light=config.light, budget=budget, layout=layout
     )
-    lit = LitBake(bake, PolarGrid(planned.rings, planned.azimuths), wi, w_terms)
+    tile = TileBake(bake, PolarGrid(planned.rings, planned.azimuths), wi, w_terms)
     key = digest.of_json(_parameters(config, surface_key, planned, wi))
-    return Shelf(key, lit, field, windows.places(field.extent, config.coherence))
+    return Shelf(key, tile, field, windows.places(field.extent, config.coherence))
 
 
 def table(store: Store, found: Shelf, tiles: Tiles) -> Found:
-    """Makes the table of a light on some tiles.
+    """Makes the table of some tiles.
 
-    store: where tiles are read and written. found: the shelf of the light. tiles: those that the table covers.
+    store: where tiles are read and written. found: their shelf. tiles: those that the table covers.
     Raises StorageError where tiles cannot be written, DeviceError if no device works.
     """
     folder, places = store.tiles(found.key), [(int(b), int(k)) for b, k in np.argwhere(tiles.covered)]
@@ -103,7 +155,7 @@ def table(store: Store, found: Shelf, tiles: Tiles) -> Found:
         if baked:
             folder.write({place: tile.tobytes() for place, tile in baked.items()})
         folder.touch()
-    return Found(assemble(samples | baked, tiles, found.lit), len(baked))
+    return Found(assemble(samples | baked, tiles, found.tile), len(baked))
 
 
 def _samples(content: bytes, place: Place, tiles: Tiles) -> NDArray[np.float32]:
@@ -111,7 +163,7 @@ def _samples(content: bytes, place: Place, tiles: Tiles) -> NDArray[np.float32]:
     return np.frombuffer(content, np.float32).reshape(rings, -1, AZIMUTHS)
 
 
-def _parameters(config: Config, surface_key: str, planned: Plan, wi: Array) -> dict[str, Any]:
+def _parameters(config: Config, surface_key: str, planned: Plan, wi: Array | None) -> dict[str, Any]:
     """Returns all that a tile's samples depend on, but for its place."""
     return {
         "version": _VERSION,
@@ -124,5 +176,5 @@ def _parameters(config: Config, surface_key: str, planned: Plan, wi: Array) -> d
         "delta_e": config.budget_delta_e,
         "form": power_spectrum.layout_of(config).form,
         # far below the width of any lobe
-        "light": [round(float(x), 9) + 0.0 for x in wi],
+        "light": None if wi is None else [round(float(x), 9) + 0.0 for x in wi],
     }

@@ -1,4 +1,4 @@
-"""Tables of one light, baked tile by tile, against the whole table of the same grid."""
+"""Tables that are baked tile by tile, against the whole table of the same grid."""
 
 from functools import cache, partial
 
@@ -11,10 +11,10 @@ from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.optics import geometry
 from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Direction, Scene, Views
-from pipeline.tables.polar.lit import LitBake, LitTable, assemble
 from pipeline.tables.polar.planning import plan
 from pipeline.tables.polar.reach import reach, unit_vector
 from pipeline.tables.polar.table import PolarTable
+from pipeline.tables.polar.tile_bake import TileBake, TileTable, assemble
 from tests.tables.planned import SIGMA, config, field_of
 
 GRID = PolarGrid(Rings(96, 0.5), Azimuths(640, 0.9, 0.2))
@@ -24,7 +24,7 @@ LINE = {"spectrum": {"illuminant": {"lambda_nm": 532}}}
 GOLD = {"material": {"fresnel": "conductor", "metal": "Au"}}
 
 
-def settings(found: Config, scene: Scene) -> LitBake:
+def settings(found: Config, scene: Scene | None) -> TileBake:
     budget = plan.Budget(0.02, 7500.0)
     numbers = plan.numbers(field_of(found).half_range_um, SIGMA, found.light, None, budget, found.table)
     made = plan.Plan(numbers.terms, numbers.s_nodes, numbers.w_terms, GRID.azimuths, GRID.rings, None)
@@ -36,7 +36,7 @@ def settings(found: Config, scene: Scene) -> LitBake:
         budget=budget,
         layout=found.table,
     )
-    return LitBake(bake, GRID, unit_vector(scene.lights[0]), terms)
+    return TileBake(bake, GRID, None if scene is None else unit_vector(scene.lights[0]), terms)
 
 
 @cache
@@ -48,7 +48,7 @@ def whole_of(kind: str) -> tuple[Config, Stack, PolarTable]:
     return found, stack, bake.table(power, GRID.rings, bake.rules(GRID.rings.rho()))
 
 
-def lit_of(kind: str, scene: Scene) -> tuple[LitTable, PolarTable]:
+def lit_of(kind: str, scene: Scene) -> tuple[TileTable, PolarTable]:
     found, stack, table = whole_of(kind)
     lit, tiles = settings(found, scene), reach(scene, GRID).tiles()
     return assemble(lit.samples(stack, tiles.covered), tiles, lit), table
@@ -97,6 +97,20 @@ def test_what_no_tile_covers_and_what_another_light_lights_is_unknown() -> None:
     uvw = -(wi + normal)[None]
     assert np.isfinite(lit.look_up(uvw)).all()
     assert np.isnan(lit.look_up(uvw * [1.0, 1.0, 0.9])).all()
+
+
+@pytest.mark.parametrize("kind", ["white", "gold"])
+def test_polynomials_of_tiles_are_those_of_the_whole_table(kind: str) -> None:
+    found, stack, table = whole_of(kind)
+    bake, tiles = settings(found, None), reach(OBLIQUE, GRID).tiles()
+    made = assemble(bake.samples(stack, tiles.covered), tiles, bake)
+    uvw = geometry.uvw(*random_pairs(OBLIQUE, 3000, 5))
+    # any |w| is known where (u, v) is
+    uvw[:, 2] *= np.linspace(0.2, 1.0, len(uvw))
+    expected = table.look_up(uvw)
+    scale = np.sqrt(np.mean(expected**2, axis=0)).max()
+    np.testing.assert_allclose(made.look_up(uvw), expected, atol=2e-3 * scale)
+    assert np.isnan(made.look_up(geometry.uvw(*random_pairs(NORMAL, 3000, 5)))).any()
 
 
 def test_nothing_missing_bakes_nothing() -> None:

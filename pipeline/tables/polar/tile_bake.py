@@ -1,14 +1,15 @@
-"""Tables of a flat sample under one directional light, baked tile by tile.
+"""Polar tables that are baked tile by tile: only the tiles that a scene reaches.
 
-Under one light, (u, v) determines the view and so |w| = cos(ti) + cos(tr). A texel then holds one value for each of
-X, Y and Z instead of a polynomial in |w|, and one value in all under a laser line, whose X and Z are constant
-multiples of Y. A tile depends on its grid, its light and the material alone, never on the tiles that are baked with
-it.
+A texel holds X, Y and Z as polynomials in |w|, for any light and view. On a flat sample under one directional light,
+(u, v) determines the view and so |w| = cos(ti) + cos(tr): a texel then holds one value for each of X, Y and Z, and
+one value in all under a laser line, whose X and Z are constant multiples of Y. A tile depends on its grid, on light
+and material, never on the tiles that are baked with it.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,28 +28,32 @@ from pipeline.tables.polar import line_points
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.reach import known_cells, smooth_w_of, w_of
 from pipeline.tables.polar.spectral_integral import at_nodes
+from pipeline.tables.polar.table import w_position
 
 _VECTORS = AZIMUTHS // LANES  # of a sector
 # radii of E beyond those of a band's wavelengths, for Lagrange's polynomials
 _SPARE_RADII = ORDER
+# rings beyond the horizon of views that are computed; the last is repeated, and a look-up at the horizon feels that
+# by a weight of 0.268^3 / 6
+_BEYOND_HORIZON = 3
 # largest difference of |w| at which a direction belongs to the light of a table
 _SAME_W = 1e-4
 
-# samples of tiles by band and sector, float32 (rings of the band, channels, AZIMUTHS)
+# samples of tiles by band and sector, float32 (rings of the band, outputs, AZIMUTHS)
 Samples = dict[tuple[int, int], NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
-class LitBake:
-    """The bake of tiles for one light.
+class TileBake:
+    """The bake of tiles.
 
-    bake: the settings, whose w_terms are not read. grid: the texels. wi: unit vector towards the light (3,).
-    w_terms: computes the number of nodes in |w| for half the width of an interval.
+    bake: the settings. grid: the texels. wi: unit vector towards the light (3,), None for polynomials in |w|, which
+    serve all lights. w_terms: computes the number of nodes in |w| for half the width of the interval of one light.
     """
 
     bake: PolarBake
     grid: PolarGrid
-    wi: Array
+    wi: Array | None
     w_terms: Callable[[float], int]
 
     @cached_property
@@ -58,19 +63,42 @@ class LitBake:
 
     @property
     def primaries(self) -> Array:
-        """XYZ of one unit of every channel, (channels, 3): Y alone is stored for a laser line."""
-        if not self.bake.radiometry.light.is_line:
+        """XYZ of one unit of every channel, (channels, 3): Y alone is stored for a laser line and one light."""
+        if not self._is_luminance:
             return np.eye(3)
         weights = self.bake.radiometry.illumination(1.0).weights
-        return weights / weights[:, 1:2]
+        return np.asarray(weights / weights[:, 1:2])
+
+    @property
+    def _is_luminance(self) -> bool:
+        return self.wi is not None and self.bake.radiometry.light.is_line
+
+    @property
+    def outputs(self) -> int:
+        """Number of values of a texel."""
+        return 3 * self.bake.w_terms if self.wi is None else len(self.primaries)
 
     def radii(self, of_bands: NDArray[np.intp]) -> slice:
         """Returns the radii of E that bands need, as a part of `PolarBake.radius_per_um`."""
         radius, rho = self.bake.radius_per_um, self.grid.rings.rho()
-        first, last = rho[RINGS * of_bands[0]], rho[min(RINGS * (of_bands[-1] + 1), len(rho)) - 1]
+        first, last = rho[self._rings(of_bands[0])][0], rho[self._rings(of_bands[-1])][-1]
         low, high = self.rules.kappa_ends_per_um
         start, stop = np.searchsorted(radius, [first * low.min(), last * high.max()])
         return slice(max(0, int(start) - _SPARE_RADII), min(len(radius), int(stop) + _SPARE_RADII))
+
+    @cached_property
+    def _last_ring(self) -> int:
+        """The last ring that is computed: under one light, a few beyond the horizon of all views."""
+        last = self.grid.rings.count - 1
+        if self.wi is None:
+            return last
+        horizon = self.grid.rings.ring_from_rho(np.asarray(1.0 + np.hypot(self.wi[0], self.wi[1])))
+        return min(last, ceil(float(horizon)) + _BEYOND_HORIZON)
+
+    def _rings(self, band: int) -> NDArray[np.intp]:
+        """Returns the ring of each row of a band; the last one that is computed serves those beyond it."""
+        rings = np.arange(RINGS * band, min(RINGS * (band + 1), self.grid.rings.count))
+        return np.minimum(rings, self._last_ring)
 
     def samples(self, stack: Stack, missing: NDArray[np.bool_], places: Places = MIDDLE) -> Samples:
         """Computes the samples of tiles.
@@ -106,71 +134,102 @@ class LitBake:
 
         at: where in E the vectors of azimuths of the whole turn lie.
         """
-        rings = slice(RINGS * band, min(RINGS * (band + 1), self.grid.rings.count))
+        rings, row = np.unique(self._rings(band), return_inverse=True)
         rho, rules = self.grid.rings.rho()[rings], _of_rings(self.rules, rings)
         s_max = power_spectrum.s_max(self.bake.lambda_min_nm)
         points = line_points.choose(radius, self.bake.s_nodes, s_max, rho, rules)
         wanted = _vectors(sectors)
         vectors = _paired(wanted, len(at) // 2) if (points.place < 0).any() else wanted.reshape(2, -1)
         azimuths = (LANES * vectors.ravel()[:, None] + np.arange(LANES)).ravel()
-        w = self._w(rho, azimuths)
-        span = _span(self._w(rho, np.arange(self.grid.azimuths.count)), points)
-        w_terms = self.w_terms(0.5 * float(np.max(span.high - span.low)))
-        within = spectral_operator.group_w(points, span, w_terms)
-        reflected = at_nodes(self.bake.radiometry.reflectance, rho, within, rules)
-        of = radius, s_max, rho, points, rules, reflected, span, w
-        xyz = spectral_operator.integrate_at(values, at[vectors].T, *of)
-        kept = xyz[:, 1:2] if self.bake.radiometry.light.is_line else xyz
+        of = _Band(values, at[vectors].T, radius, s_max, rho, points, rules)
+        kept = self._polynomials(of) if self.wi is None else self._values(of, self.wi, azimuths)
         place = np.empty(len(at), int)
         place[vectors.ravel()] = np.arange(vectors.size)
         by_vector = kept.reshape(*kept.shape[:2], -1, LANES)
-        return {
-            (band, int(k)): by_vector[:, :, place[_vectors(np.array([k]))]].reshape(*kept.shape[:2], AZIMUTHS)
-            for k in sectors
-        }
+        of_sector = {int(k): by_vector[:, :, place[_vectors(np.array([k]))]] for k in sectors}
+        return {(band, k): tile[row].reshape(len(row), -1, AZIMUTHS) for k, tile in of_sector.items()}
 
-    def _w(self, rho: Array, azimuths: NDArray[np.intp]) -> Array:
-        """Computes |w| of the light at rings `rho` (n_rings,) and azimuths by index, (n_rings, azimuths)."""
-        phi = self.grid.azimuths.phi()[azimuths]
-        uv = np.stack([np.outer(rho, np.cos(phi)), np.outer(rho, np.sin(phi))], axis=-1)
-        return smooth_w_of(self.wi, uv, self.grid.rings.step)
+    def _polynomials(self, of: "_Band") -> NDArray[np.float32]:
+        """Computes the Chebyshev terms in |w| (n_rings, 3 w terms, azimuths)."""
+        span = spectral_operator.whole_span(of.rho, of.points)
+        reflected = self._reflected(of, span, self.bake.w_terms)
+        line = of.radius, of.s_max, of.rho, of.points, of.rules
+        return spectral_operator.integrate(of.values, *line, reflected, of.pairs)
+
+    def _values(self, of: "_Band", wi: Array, azimuths: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Computes X, Y and Z, or Y alone, at |w| of the light (n_rings, channels, azimuths); azimuths: by index."""
+        phi = self.grid.azimuths.phi()
+        uv = np.stack([np.outer(of.rho, np.cos(phi)), np.outer(of.rho, np.sin(phi))], axis=-1)
+        # over the whole turn, so that nodes do not depend on the tiles that are baked
+        w = smooth_w_of(wi, uv, self.grid.rings.step)
+        span = _span(w, of.points)
+        reflected = self._reflected(of, span, self.w_terms(0.5 * float(np.max(span.high - span.low))))
+        line = of.radius, of.s_max, of.rho, of.points, of.rules
+        xyz = spectral_operator.integrate_at(of.values, of.pairs, *line, reflected, span, w[:, azimuths])
+        return xyz[:, 1:2] if self._is_luminance else xyz
+
+    def _reflected(self, of: "_Band", span: Span, w_terms: int) -> NDArray[np.float32]:
+        within = spectral_operator.group_w(of.points, span, w_terms)
+        return at_nodes(self.bake.radiometry.reflectance, of.rho, within, of.rules)
 
 
 @dataclass(frozen=True)
-class LitTable:
-    """A table under one light: coefficients of bicubic B-splines, and what they cover.
+class _Band:
+    """The rings of a band and E for them: the arguments of the spectral operator, as `integrate` there has them."""
 
-    values: float32 (rings, channels, azimuths), to the last covered band; repeated from the nearest covered texel
-    where no tile is. tiles: those that were baked. primaries: XYZ of one unit of every channel (channels, 3).
-    wi: unit vector towards the light (3,).
+    values: NDArray[np.float32]
+    pairs: NDArray[np.intp]
+    radius: Array
+    s_max: float
+    rho: Array
+    points: LinePoints
+    rules: RingQuadratures
+
+
+@dataclass(frozen=True)
+class TileTable:
+    """Coefficients of bicubic B-splines of some tiles.
+
+    values: float32 (rings, outputs, azimuths), to the last covered band; they continue samples that are repeated from
+    the nearest covered texel where no tile is. tiles: those that were baked. primaries: XYZ of one unit of every
+    channel (channels, 3). wi: unit vector towards the light (3,), None for polynomials in |w|.
     """
 
     values: NDArray[np.float32]
     tiles: Tiles
     primaries: Array
-    wi: Array
+    wi: Array | None
 
     @property
     def nbytes(self) -> int:
         """Bytes of the samples of all tiles."""
-        return 4 * self.tiles.texels * len(self.primaries)
+        return int(4 * self.tiles.texels * self.values.shape[1])
 
     @cached_property
     def _known(self) -> NDArray[np.bool_]:
         return known_cells(self.tiles)
 
+    @cached_property
+    def _xyz(self) -> NDArray[np.float32]:
+        if len(self.primaries) == 3:
+            return self.values
+        return np.ascontiguousarray(np.einsum("rca,cx->rxa", self.values, self.primaries.astype(np.float32)))
+
     def look_up(self, uvw: Array) -> Array:
         """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3).
 
-        NaN where no tile covers the look-up, and where |w| is not that of the light.
+        NaN where no tile covers the look-up, and where |w| is not that of the table's one light.
         """
         grid, uv = self.tiles.grid, uvw[:, :2]
-        ring = np.clip(grid.rings.ring_from_rho(np.hypot(uv[:, 0], uv[:, 1])), 0.0, grid.rings.count - 1.0)
+        rho = np.hypot(uv[:, 0], uv[:, 1])
+        ring = np.clip(grid.rings.ring_from_rho(rho), 0.0, grid.rings.count - 1.0)
         azimuth = grid.azimuths.azimuth_from_uv(uv)
         known = self._known[ring.astype(int), azimuth.astype(int)]
-        known &= np.abs(np.abs(uvw[:, 2]) - w_of(self.wi, uv)) <= _SAME_W
-        xyz = np.einsum("rca,cx->rxa", self.values, self.primaries.astype(np.float32))
-        found = cubic_spline.look_up(xyz, np.minimum(ring, len(xyz) - 1.0), azimuth, np.zeros(len(uvw)))
+        if self.wi is not None:
+            known &= np.abs(np.abs(uvw[:, 2]) - w_of(self.wi, uv)) <= _SAME_W
+        # one value a texel is a polynomial of one term
+        of = np.minimum(ring, len(self.values) - 1.0), azimuth, w_position(rho, uvw[:, 2])
+        found = cubic_spline.look_up(self._xyz, *of)
         return np.asarray(np.where(known[:, None], found.astype(np.float64), np.nan))
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
@@ -180,19 +239,19 @@ class LitTable:
         return radiometry.direction_factor(wi, wr)
 
 
-def assemble(samples: Mapping[tuple[int, int], NDArray[np.float32]], tiles: Tiles, lit: LitBake) -> LitTable:
+def assemble(samples: Mapping[tuple[int, int], NDArray[np.float32]], tiles: Tiles, bake: TileBake) -> TileTable:
     """Puts splines through the samples of tiles.
 
-    samples: of all covered tiles, by band and sector. tiles: which these are. lit: the bake of their light.
+    samples: of all covered tiles, by band and sector. tiles: which these are, at least one. bake: their bake.
     """
     grid = tiles.grid
     last = int(np.flatnonzero(tiles.covered.any(axis=1))[-1])
     rings = min(RINGS * (last + 1), grid.rings.count)
-    values = np.empty((rings, len(lit.primaries), grid.azimuths.count), np.float32)
+    values = np.empty((rings, bake.outputs, grid.azimuths.count), np.float32)
     for (band, sector), tile in samples.items():
         values[RINGS * band : RINGS * band + len(tile), :, AZIMUTHS * sector : AZIMUTHS * (sector + 1)] = tile
     _fill(values, tiles.covered[: last + 1])
-    return LitTable(cubic_spline.coefficients(values), tiles, lit.primaries, lit.wi)
+    return TileTable(cubic_spline.coefficients(values), tiles, bake.primaries, bake.wi)
 
 
 def _fill(values: NDArray[np.float32], covered: NDArray[np.bool_]) -> None:
@@ -226,7 +285,7 @@ def _paired(vectors: NDArray[np.intp], half: int) -> NDArray[np.intp]:
     return np.stack([first, first + half])
 
 
-def _of_rings(rules: RingQuadratures, rings: slice) -> RingQuadratures:
+def _of_rings(rules: RingQuadratures, rings: NDArray[np.intp]) -> RingQuadratures:
     return RingQuadratures(rules.lambda_um, rules.weights, rules.first[rings], rules.count[rings])
 
 
