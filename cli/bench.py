@@ -193,10 +193,16 @@ def _print_scene(found: "SceneResults") -> None:
                 "kernels": lambda row: _ms(row[1].kernel_s),
                 "bytes": lambda row: f"{row[1].bytes / 1e6:.2f} MB",
                 "tiles": lambda row: f"{row[1].tiles} of {row[1].of_tiles}",
+                "saved": lambda row: "" if row[1].savings is None else _saved(row[1].savings),
             },
         )
     console.say("")
     _print_checks(found.checks)
+
+
+def _saved(savings: Any) -> str:
+    """Shares that a scene saves, by name."""
+    return ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in vars(savings).items())
 
 
 def _ms(seconds: float) -> str:

@@ -6,6 +6,7 @@ config without a scene, for all lights and views.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from pipeline.optics.random_directions import random_pairs
 from pipeline.optics.scene import Direction, Scene, Views
 from pipeline.progress import Progress
 from pipeline.stages.polar import power_spectrum, scene_tiles
-from pipeline.stages.polar.scene_tiles import Shelf
+from pipeline.stages.polar.scene_tiles import Savings, Shelf
 from pipeline.stages.surface import field_of
 from pipeline.store import digest, scratch
 from pipeline.store.store import Store
@@ -37,12 +38,14 @@ from pipeline.surface.windows import Places
 from pipeline.tables.evaluate import Table, interpolator
 from pipeline.tables.polar.planning import plan
 from pipeline.tables.polar.planning.plan import Plan
-from pipeline.tables.polar.reach import Reach, of_directions, reach
+from pipeline.tables.polar.reach import of_directions, reach
 from pipeline.tables.polar.table import PolarTable
+from pipeline.tables.polar.tile_bake import TileTable
 
 _NORMAL = Direction(theta_deg=0.0)
 _SECOND = Direction(theta_deg=30.0, phi_deg=180.0)
 _LASER = Light(illuminant=LaserLine(lambda_nm=532.0))
+_ON_NORMAL, _ON_SCREEN = "normal light", "laser on a screen"
 _SCREEN_DEG, _SCREEN_SAMPLES = 60.0, 1500
 _REPEATS, _DIRECTIONS, _EXPOSURE_RU, _SEED = 9, 2000, 7500.0, 15
 
@@ -51,13 +54,15 @@ _REPEATS, _DIRECTIONS, _EXPOSURE_RU, _SEED = 9, 2000, 7500.0, 15
 class TableCost:
     """The cost of one table: kernels' seconds from heights to coefficients or samples, the shortest of each kernel.
 
-    bytes: of the table. tiles, of_tiles: those that were baked, and those of the grid.
+    bytes: of the table. tiles, of_tiles: those that were baked, and those of the grid. savings: beside the full bake
+    of the same light, None for that.
     """
 
     kernel_s: float
     bytes: int
     tiles: int
     of_tiles: int
+    savings: Savings | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +113,7 @@ class _Bench:
         sigma_um = config.coherence.sigma_um
         trial = plan.start(field, self.places, sigma_um, light, None, self.budget, layout)
         self.plan: Plan = plan.choose(trial, None, self.budget, layout)
-        self.full, self.full_cost = _measured(self._full)
+        self.full = self.bake_full()
 
     @property
     def places(self) -> Places:
@@ -116,14 +121,6 @@ class _Bench:
 
     def shelf(self, light: Direction) -> Shelf:
         return scene_tiles.shelf(self.config, self.field, self._surface, self.plan, light)
-
-    def table(self, light: Direction, visited: Reach, store: Store) -> tuple[scene_tiles.Found, TableCost]:
-        """Return the table of a light, by way of a store, and the cost of its tiles without one."""
-        shelf, tiles = self.shelf(light), visited.tiles()
-        _, kernel_s = _measured(lambda: shelf.bake(tiles.covered))
-        found = scene_tiles.table(store, shelf, tiles)
-        cost = TableCost(kernel_s, found.table.nbytes, int(tiles.covered.sum()), tiles.covered.size)
-        return found, cost
 
     def errors(self, table: Table, wi: Array, wr: Array, exact: Array) -> Array:
         """Return the CIELAB differences of a table from XYZ (directions, 3) at the exposure of all errors here."""
@@ -135,68 +132,85 @@ class _Bench:
         reference = reference_of(self.field, self.config, progress)
         return reference.xyz(self.config.light, self.config.material, wi, wr)
 
-    def _full(self) -> PolarTable:
+    def bake_full(self) -> PolarTable:
         layout = power_spectrum.layout_of(self.config)
         bake = self.plan.bake(self.config.radiometry, self.budget, layout)
         power = bake.power_spectrum(bake.stack(self.field, whole=True), self.plan.azimuths, self.places)
         return bake.table(power, self.plan.rings, bake.rules(self.plan.rings.rho()))
 
 
-def _measured(work: Callable[[], Any]) -> tuple[Any, float]:
-    """Return the result of `work` and the seconds of its kernels.
+def _kernel_seconds(works: dict[str, Callable[[], Any]]) -> dict[str, float]:
+    """Measure the seconds of the kernels of several works, by name.
 
-    They are the sum of the shortest time of each kernel in several runs after one to warm up: other processes only
-    add, in bursts that seldom spare a whole run.
+    They are the sum of the shortest time of each kernel in several runs, in which the works take turns: other
+    processes only add, in bursts that seldom spare a whole run.
     """
-    found: Any = work()
-    least: dict[str, float] = {}
+    least: dict[str, dict[str, float]] = {name: {} for name in works}
     for _ in range(_REPEATS):
-        del found
-        with device.default_device().timing() as launches:
-            found = work()
-        seconds: dict[str, float] = {}
-        for launch in launches:
-            seconds[launch.kernel] = seconds.get(launch.kernel, 0.0) + launch.seconds
-        least = {kernel: min(least.get(kernel, np.inf), each) for kernel, each in seconds.items()}
-    return found, sum(least.values())
+        for name, work in works.items():
+            with device.default_device().timing() as launches:
+                work()
+            seconds: dict[str, float] = {}
+            for launch in launches:
+                seconds[launch.kernel] = seconds.get(launch.kernel, 0.0) + launch.seconds
+            least[name] = {kernel: min(least[name].get(kernel, np.inf), each) for kernel, each in seconds.items()}
+    return {name: sum(kernels.values()) for name, kernels in least.items()}
 
 
 def _surface(config: Config, progress: Progress) -> SceneCosts:
-    texts, field = Texts(__package__, "scenes", surface=config.name), field_of(config)[0]
-    white, checks = _Bench(config, field, config.light), []
-    grid_tiles = reach(None, white.full.grid).tiles().covered.size
-    full = TableCost(white.full_cost, white.full.nbytes, grid_tiles, grid_tiles)
-    costs = {"full": full}
+    texts, field, checks = Texts(__package__, "scenes", surface=config.name), field_of(config)[0], []
+    white, laser = _Bench(config, field, config.light), _Bench(config, field, _LASER)
+    normal, (wi, wr) = Scene(lights=[_NORMAL]), _screen()
+    of_normal, of_screen = reach(normal, white.full.grid), of_directions(laser.full.grid, geometry.uvw(wi, wr))
+    shelves = {_ON_NORMAL: white.shelf(_NORMAL), _ON_SCREEN: laser.shelf(LIGHT)}
+    tiles = {_ON_NORMAL: of_normal.tiles(), _ON_SCREEN: of_screen.tiles()}
+    works: dict[str, Callable[[], Any]] = {"full": white.bake_full, "laser, full": laser.bake_full}
+    works |= {name: partial(shelf.bake, tiles[name].covered) for name, shelf in shelves.items()}
+    seconds = _kernel_seconds(works)
+    costs = {
+        name: TableCost(seconds[name], bench.full.nbytes, *2 * (tiles[of].covered.size,))
+        for name, bench, of in (("full", white, _ON_NORMAL), ("laser, full", laser, _ON_SCREEN))
+    }
 
     def check(key: str, value: float, remark: str = "", **bound: float) -> None:
         checks.append(texts.check("{surface}.scene." + key, value, remark=remark, **bound))
 
     with scratch.temporary() as folder:
         store = Store(folder)
-        scene = Scene(lights=[_NORMAL])
-        found, costs["normal light"] = white.table(_NORMAL, reach(scene, white.full.grid), store)
-        wi, wr = random_pairs(scene, _DIRECTIONS, _SEED)
-        _check_light(check, "normal", white, found, costs["normal light"], full, (wi, wr), progress)
+        for name, key, bench, pairs in (
+            (_ON_NORMAL, "normal", white, random_pairs(normal, _DIRECTIONS, _SEED)),
+            (_ON_SCREEN, "laser", laser, _random(wi, wr)),
+        ):
+            found = scene_tiles.table(store, shelves[name], tiles[name]).table
+            covered = tiles[name].covered
+            costs[name] = TableCost(
+                seconds[name], found.nbytes, int(covered.sum()), covered.size, shelves[name].savings(tiles[name])
+            )
+            _check_light(check, key, bench, found, costs[name], costs["full"], pairs, progress)
         _check_reuse(check, white, store)
-        laser = _Bench(config, field, _LASER)
-        screen = Screen(LIGHT, _SCREEN_SAMPLES, side_mm=200.0 * np.tan(np.radians(0.5 * _SCREEN_DEG)))
-        wi, wr = screen.directions()
-        lit = geometry.above_horizon(wi, wr)
-        visited = of_directions(laser.full.grid, geometry.uvw(wi[lit], wr[lit]))
-        costs["laser, full"] = TableCost(laser.full_cost, laser.full.nbytes, *2 * (visited.tiles().covered.size,))
-        found, costs["laser on a screen"] = laser.table(LIGHT, visited, store)
-        # 2 degrees above the horizon, as random directions are
-        seen = np.flatnonzero(wr[:, 2] > np.cos(np.radians(88.0)))
-        pick = np.random.default_rng(_SEED).choice(seen, _DIRECTIONS)
-        _check_light(check, "laser", laser, found, costs["laser on a screen"], full, (wi[pick], wr[pick]), progress)
     return SceneCosts(config.name, costs, checks)
+
+
+def _screen() -> tuple[Array, Array]:
+    """Return wi and wr (directions, 3) of the screen's pixels above the horizon."""
+    screen = Screen(LIGHT, _SCREEN_SAMPLES, side_mm=200.0 * np.tan(np.radians(0.5 * _SCREEN_DEG)))
+    wi, wr = screen.directions()
+    seen = geometry.above_horizon(wi, wr)
+    return wi[seen], wr[seen]
+
+
+def _random(wi: Array, wr: Array) -> tuple[Array, Array]:
+    """Draw from pairs those on which errors are stated, 2 degrees or more above the horizon as random ones are."""
+    seen = np.flatnonzero(wr[:, 2] > np.cos(np.radians(88.0)))
+    chosen = np.random.default_rng(_SEED).choice(seen, _DIRECTIONS)
+    return wi[chosen], wr[chosen]
 
 
 def _check_light(
     check: Callable[..., None],
     name: str,
     bench: _Bench,
-    found: scene_tiles.Found,
+    found: TileTable,
     cost: TableCost,
     full: TableCost,
     pairs: tuple[Array, Array],
@@ -205,9 +219,9 @@ def _check_light(
     """Check cost, errors and values of one light's table."""
     budget, exact = bench.budget.delta_e, bench.exact(*pairs, progress)
     of_full = bench.errors(bench.full, *pairs, exact)
-    of_light = bench.errors(found.table, *pairs, exact)
+    of_light = bench.errors(found, *pairs, exact)
     full_xyz = np.maximum(interpolator(bench.full, bench.config.radiometry)(*pairs), 0.0)
-    between = bench.errors(found.table, *pairs, full_xyz)
+    between = bench.errors(found, *pairs, full_xyz)
     ms = f"{1e3 * cost.kernel_s:.0f} of {1e3 * full.kernel_s:.0f} ms"
     check(f"{name}_time", cost.kernel_s / full.kernel_s, f"{ms}; {cost.tiles} of {cost.of_tiles} tiles")
     check(f"{name}_bytes", cost.bytes / full.bytes, f"{cost.bytes / 1e6:.2f} of {full.bytes / 1e6:.1f} MB")

@@ -32,6 +32,20 @@ _KERNELS = ("polar_power_spectrum.cl", "dft_stack.cl", "spectral_operator.cl")
 
 
 @dataclass(frozen=True)
+class Savings:
+    """Shares of a full bake that a scene saves.
+
+    texels: of the grid. values: of a texel. azimuths, radii: of the power spectrum E. frequencies: of the stack.
+    """
+
+    texels: float
+    values: float
+    azimuths: float
+    radii: float
+    frequencies: float
+
+
+@dataclass(frozen=True)
 class Shelf:
     """The tiles of a surface under one light, or of polynomials in |w| for all lights.
 
@@ -62,6 +76,18 @@ class Shelf:
             for tile, samples in self.tile.samples(stack, missing).items():
                 mean[tile] = mean.get(tile, np.float32(0.0)) + samples / np.float32(self.places.count)
         return mean
+
+    def savings(self, tiles: Tiles) -> Savings:
+        """Computes what is saved beside polynomials in |w| on all tiles."""
+        bake, grid = self.tile.bake, self.tile.grid
+        radius, radii = bake.radius_per_um, self.tile.radii(np.flatnonzero(tiles.covered.any(axis=1)))
+        return Savings(
+            texels=1.0 - tiles.texels / grid.texels,
+            values=1.0 - self.tile.outputs / (3 * bake.w_terms),
+            azimuths=1.0 - len(self.tile.half_turn(tiles.covered)) / (grid.azimuths.count // 2),
+            radii=1.0 - len(radius[radii]) / len(radius),
+            frequencies=1.0 - float(radius[radii][-1] / radius[-1]) ** 2,
+        )
 
 
 @dataclass(frozen=True)

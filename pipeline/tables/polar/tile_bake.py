@@ -86,6 +86,12 @@ class TileBake:
         start, stop = np.searchsorted(radius, [first * low.min(), last * high.max()])
         return slice(max(0, int(start) - _SPARE_RADII), min(len(radius), int(stop) + _SPARE_RADII))
 
+    def half_turn(self, tiles: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Lists the azimuths of half a turn at which E serves tiles (bands, sectors), with those half a turn on."""
+        half = self.grid.azimuths.count // (2 * LANES)
+        vectors = np.unique(_vectors(np.flatnonzero(tiles.any(axis=0))) % half)
+        return np.asarray((LANES * vectors[:, None] + np.arange(LANES)).ravel())
+
     @cached_property
     def _last_ring(self) -> int:
         """The last ring that is computed: under one light, a few beyond the horizon of all views."""
@@ -108,11 +114,9 @@ class TileBake:
         """
         if not missing.any():
             return {}
-        radii = self.radii(np.flatnonzero(missing.any(axis=1)))
-        half = self.grid.azimuths.count // (2 * LANES)
-        vectors = np.unique(_vectors(np.flatnonzero(missing.any(axis=0))) % half)
-        phi = self.grid.azimuths.phi().reshape(-1, LANES)[vectors].ravel()
-        radius = self.bake.radius_per_um[radii]
+        radius = self.bake.radius_per_um[self.radii(np.flatnonzero(missing.any(axis=1)))]
+        half, azimuths = self.grid.azimuths.count // (2 * LANES), self.half_turn(missing)
+        phi, vectors = self.grid.azimuths.phi()[azimuths], azimuths[::LANES] // LANES
         lambda_min, nodes = self.bake.lambda_min_nm, self.bake.s_nodes
         values = power_spectrum.gather(stack, phi, radius, lambda_min, nodes, places)
         at = np.full(2 * half, -1)
