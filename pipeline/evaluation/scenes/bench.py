@@ -15,7 +15,7 @@ import numpy as np
 from kernels import device
 from pipeline.accuracy.exact import reference_of
 from pipeline.arrays import Array
-from pipeline.config.models import Config
+from pipeline.config.models import Accuracy, Config
 from pipeline.evaluation import results
 from pipeline.evaluation.check import Check
 from pipeline.evaluation.figures.screen import LIGHT, Screen
@@ -36,6 +36,7 @@ from pipeline.surface import windows
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
 from pipeline.tables.evaluate import Table, interpolator
+from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.planning import plan
 from pipeline.tables.polar.planning.plan import Plan
 from pipeline.tables.polar.reach import of_directions, reach
@@ -104,10 +105,11 @@ def run(configs: Sequence[tuple[Config, Path]], progress: Progress, note: Callab
 
 
 class _Bench:
-    """A config of one light and no scene, its surface, and its grid and full table."""
+    """A surface's grid and full table under one light. A config's [scene], [table] and [accuracy] are left aside."""
 
     def __init__(self, config: Config, field: HeightField, light: Light) -> None:
-        self.config = config.model_copy(update={"light": light, "scene": None})
+        aside = {"scene": None, "table": PolarLayout(), "accuracy": Accuracy()}
+        self.config = config.model_copy(update={"light": light, **aside})
         self.field, self._surface = field, digest.of_json(config.surface.model_dump(mode="json"))
         self.budget, layout = power_spectrum.budget(self.config), power_spectrum.layout_of(self.config)
         sigma_um = config.coherence.sigma_um
