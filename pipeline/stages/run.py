@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from threading import Thread
 from typing import Any
 
@@ -118,18 +117,14 @@ def execute(
     none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
-    uses_device = any(step.stage.uses_device and not step.cached for step in steps)
-    if uses_device:
-        # a missing device is reported before any work; its driver loads while zarr is imported, which takes as long
-        found = _Device()
-        found.start()
-        import_module("zarr")
-        found.result()
+    device = _Device() if any(step.stage.uses_device and not step.cached for step in steps) else None
+    if device is not None:
+        device.start()
     opened: dict[str, Artifact] = {}
     shared = session or Session()
     for step in steps:
         name, seconds = step.stage.name, None
-        require_memory(config, steps, store, default_device().largest_bytes if uses_device else None)
+        require_memory(config, steps, store, device.largest_bytes() if device and step.stage.uses_device else None)
         if store.has(name, step.key):
             store.touch(name, step.key)
         else:
@@ -140,7 +135,7 @@ def execute(
                     for needed in set(step.stage.inputs) - set(opened):
                         opened[needed] = store.open(needed, keys[needed])
                     artifacts = {needed: opened[needed] for needed in step.stage.inputs}
-                    _make(config, step, Inputs(artifacts, shared, step.key), store, progress)
+                    _make(config, step, Inputs(artifacts, shared, step.key), store, progress, device)
                     # its files were hashed when they were written, so they need no check
                     opened[name] = store.describe(name, step.key)
                     seconds = time.perf_counter() - started
@@ -150,7 +145,10 @@ def execute(
 
 
 class _Device(Thread):
-    """Looks for a device. No program waits for it to end: an interrupted import may keep it waiting for ever."""
+    """Looks for a device while the first stage works, whose artifact is not kept where none is found.
+
+    No program waits for it to end: an interrupted import may keep it waiting for ever.
+    """
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -162,11 +160,26 @@ class _Device(Thread):
         except Exception as error:
             self._fault = error
 
-    def result(self) -> None:
+    def require(self) -> None:
         """Waits for the search and raises its error."""
         self.join()
         if self._fault is not None:
             raise self._fault
+
+    def largest_bytes(self) -> int:
+        """Waits for the search; returns how many bytes the device holds in one array, or raises its error."""
+        self.require()
+        return default_device().largest_bytes
+
+    def heeded(self, progress: Progress) -> Progress:
+        """Returns a function that reports progress, and raises the search's error as soon as it is known."""
+
+        def report(step: str, done: float) -> None:
+            if not self.is_alive():
+                self.require()
+            progress(step, done)
+
+        return report
 
 
 def require_memory(config: Config, steps: list[Step], store: Store, largest_buffer: int | None = None) -> None:
@@ -188,7 +201,10 @@ def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:
     return {step.stage.name: store.describe(step.stage.name, step.key).summary for step in made}
 
 
-def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress) -> None:
+def _make(
+    config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress, device: _Device | None
+) -> None:
+    """Makes the artifact of a step. device: the search for one, where a step of the run needs it."""
     stage = step.stage
     record: dict[str, Any] = {
         "name": config.name,
@@ -198,7 +214,9 @@ def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Pr
     }
     with store.create(stage.name, step.key, record) as (folder, whole):
         started = time.perf_counter()
-        whole["summary"] = stage.produce(config, inputs, folder, progress)
+        whole["summary"] = stage.produce(config, inputs, folder, device.heeded(progress) if device else progress)
+        if device:
+            device.require()
         whole["provenance"] = {
             **provenance.versions(),
             **(provenance.device() if stage.uses_device else {}),

@@ -46,7 +46,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     }
 
 
-def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     progress("surface", 0.0)
     field, cleaning, scan = field_of(config)
     lambda_min = config.light.lambda_min_nm
@@ -61,6 +61,7 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
         },
         {"pitch_um": list(field.pitch_um), "convention": "y up with the row index"},
     )
+    inputs.keep(field)
     progress("surface", 1.0)
     return {
         "scan": scan,
@@ -181,4 +182,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 8, (), _parameters, _produce)
+SURFACE = Stage("surface", 9, (), _parameters, _produce)
