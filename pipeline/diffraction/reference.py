@@ -63,8 +63,12 @@ def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: flo
         for first in range(0, ny, _ROWS_AT_ONCE):
             rows = slice(first, min(first + _ROWS_AT_ONCE, ny))
             phase = 2.0 * pi / lambda_um * w * heights[rows]
-            # vecdot conjugates its first argument; a matrix product would start competing threads
-            amplitude += np.sum(along_y[rows] * np.vecdot(np.cos(phase) - 1j * np.sin(phase), along_x))
+            # a matrix product would start competing threads, and sums of complex numbers take twice as long
+            (cos_x, cos_y), (sin_x, sin_y) = (
+                (np.vecdot(wave, along_x.real), np.vecdot(wave, along_x.imag))
+                for wave in (np.cos(phase), np.sin(phase))
+            )
+            amplitude += np.sum(along_y[rows] * (cos_x - sin_y + 1j * (cos_y + sin_x)))
         power[i] = np.abs(amplitude / total) ** 2
     power[~in_band(field, uvw, np.array([lambda_um]))[:, 0]] = np.nan
     return power

@@ -18,7 +18,7 @@ from pipeline.evaluation.speed import checks, growth, machine, memory, nufft, po
 from pipeline.evaluation.speed.growth import GrowthCurve, Reading, ScanCost
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
 from pipeline.evaluation.speed.polar_bake import Stages
-from pipeline.evaluation.speed.processes import Compiling, RunFailedError, warm_run_s
+from pipeline.evaluation.speed.processes import Compiling, RunFailedError, warm_run
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.stage_costs import BakeCost, StageCost
 from pipeline.evaluation.speed.timing import best_of
@@ -227,7 +227,7 @@ def test_a_large_scan_has_a_bound(peak_bytes: int | None, verdict: str) -> None:
 def test_a_run_that_fails_says_why(tmp_path: Path) -> None:
     failing = (sys.executable, "-c", "import sys; sys.exit('out of luck')")
     with pytest.raises(RunFailedError, match="out of luck"):
-        warm_run_s(failing, tmp_path / "no.toml")
+        warm_run(failing, tmp_path / "no.toml")
 
 
 def test_a_new_machine_has_bounds() -> None:

@@ -4,13 +4,14 @@ import os
 import shutil
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 
 from pipeline.progress import Progress, silent
 from pipeline.store import scratch
+from pipeline.store.store import Store
 
 # a first config, and one of other terms, nodes in s, terms in |w| and window reach
 _FIRST = '[surface]\nrecipe = { kind = "blazed", period_um = 2.5, height_um = 0.25 }\n'
@@ -44,10 +45,22 @@ class RunFailedError(RuntimeError):
 
 @dataclass(frozen=True)
 class Spent:
-    """Seconds from a process's start to its end, and processor seconds of it and of its children."""
+    """What a process took from its start to its end.
+
+    seconds: on the clock. cpu_s: processor seconds of it and of its children. stages: seconds of each stage, in
+    order; the rest of `seconds` is the start of the process, imports and digests of artifacts.
+    """
 
     seconds: float
     cpu_s: float
+    stages: Mapping[str, float]
+
+    def __str__(self) -> str:
+        """Names the seconds of every part."""
+        rest = self.seconds - sum(self.stages.values())
+        parts = [*self.stages.items(), ("start, imports and digests", rest)]
+        told = " + ".join(f"{name} {seconds:.2f}" for name, seconds in parts)
+        return f"{told} s; {self.cpu_s:.2f} s of processors"
 
 
 def run(words: Sequence[str], config: Path, cache: Path | None = None, until: str | None = None) -> Spent:
@@ -63,9 +76,11 @@ def run(words: Sequence[str], config: Path, cache: Path | None = None, until: st
         before, started = getrusage(RUSAGE_CHILDREN), time.perf_counter()
         ended = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment, text=True)
         seconds, after = time.perf_counter() - started, getrusage(RUSAGE_CHILDREN)
+        made = sorted(Store(folder / "store").artifacts(), key=lambda artifact: len(artifact.record["inputs"]))
     if ended.returncode != 0:
         raise RunFailedError(ended.stderr.strip().rpartition("\n")[2])
-    return Spent(seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    stages = {artifact.stage: artifact.record["provenance"]["seconds"] for artifact in made}
+    return Spent(seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, stages)
 
 
 def write_config(folder: Path, name: str, text: str) -> Path:
@@ -75,16 +90,16 @@ def write_config(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-def warm_run_s(command_line: Sequence[str], config: Path, progress: Progress = silent) -> float:
-    """Return the seconds of `run --until table` with an empty store and warm kernels, the fastest of five.
+def warm_run(command_line: Sequence[str], config: Path, progress: Progress = silent) -> Spent:
+    """Run `run --until table` with an empty store and warm kernels, and return the fastest of five.
 
     One more run, the first, fills the kernel cache. Raises RunFailedError.
     """
-    seconds = []
+    runs = []
     for i in range(_WHOLE_RUNS):
-        seconds.append(run(command_line, config, until="table").seconds)
+        runs.append(run(command_line, config, until="table"))
         progress("whole runs", (i + 1) / _WHOLE_RUNS)
-    return min(seconds[1:])
+    return min(runs[1:], key=lambda each: each.seconds)
 
 
 @dataclass(frozen=True)
