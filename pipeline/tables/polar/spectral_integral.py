@@ -1,9 +1,9 @@
-"""The spectral integral of E(r, phi, s) on rings, for a light, an observer and a reflectance.
+"""The spectral integral of E(r, phi, s) on rings, for lights, observers and reflectances.
 
 docs/spectral_operator.md derives the operator.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,14 @@ from pipeline.tables.polar.quadrature import RingQuadratures
 Reflectance = Callable[[Array, Array], Array]
 
 
+@dataclass(frozen=True)
+class Integrand:
+    """A light with its observer and material: the wavelengths and weights of every ring, and R."""
+
+    quadratures: RingQuadratures
+    reflectance: Reflectance = grey
+
+
 def integrate(
     power: NDArray[np.float32],
     radius_per_um: Array,
@@ -30,25 +38,58 @@ def integrate(
     w_terms: int,
     reflectance: Reflectance = grey,
 ) -> NDArray[np.float32]:
-    """Integrates the power spectrum over wavelengths: XYZ / (C cos ti) = sum_l R_l |P|^2 weights.
+    """Integrates the power spectrum over wavelengths for one light: XYZ / (C cos ti) = sum_l R_l |P|^2 weights.
+
+    Returns Chebyshev coefficients (n_rings, 3, w_terms, azimuths); all else is that of `integrate_all`.
+    """
+    only = Integrand(quadratures, reflectance)
+    return integrate_all(power, radius_per_um, s_max_per_um, rho, [only], w_terms)[0]
+
+
+def integrate_all(
+    power: NDArray[np.float32],
+    radius_per_um: Array,
+    s_max_per_um: float,
+    rho: Array,
+    integrands: Sequence[Integrand],
+    w_terms: int,
+) -> list[NDArray[np.float32]]:
+    """Integrates the power spectrum over wavelengths for several lights, in one pass over E where they share points.
 
     power: float32 (tiles, n_r, s nodes, 16), the values of a `PolarPowerSpectrum`. radius_per_um: its radii (n_r,),
     1/um. s_max_per_um: end of the interval of its nodes in s, 1/um.
-    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. quadratures: their wavelengths and weights.
-    w_terms: number of Chebyshev terms in |w|, a multiple of 4. reflectance: R.
-    Returns Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths). Raises ResourceError if
-    the weights over s do not fit into memory. See docs/spectral_operator.md.
+    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. integrands: the lights.
+    w_terms: number of Chebyshev terms in |w|, a multiple of 4.
+    Returns each light's Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths), the same to
+    the last bit as alone. Raises ResourceError if the weights over s do not fit into memory. See
+    docs/spectral_operator.md.
     """
-    s_nodes = power.shape[2]
+    of, found = (power, radius_per_um, s_max_per_um, rho), []
+    lights = [_on_rings(*of, integrand, w_terms) for integrand in integrands]
+    at_once = spectral_operator.most_lights(w_terms)
+    for first in range(0, len(lights), at_once):
+        found += [*spectral_operator.integrate(*of, lights[first : first + at_once])]
+    return [terms.reshape(len(rho), 3, w_terms, -1) for terms in found]
+
+
+def _on_rings(
+    power: NDArray[np.float32],
+    radius_per_um: Array,
+    s_max_per_um: float,
+    rho: Array,
+    integrand: Integrand,
+    w_terms: int,
+) -> spectral_operator.RingIntegrals:
+    """Chooses a light's points, and computes its reflectance."""
+    s_nodes, quadratures = power.shape[2], integrand.quadratures
     points = line_points.choose(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
     resources.require(
         "the weights of the spectral integral",
         4 * len(points.place) * s_nodes * w_terms,
         "lower the heights (a scan's outliers: surface.clip_percentile) or raise accuracy.delta_e",
     )
-    reflected = at_nodes(reflectance, rho, spectral_operator.group_w(rho, points, w_terms), quadratures)
-    terms = spectral_operator.integrate(power, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
-    return terms.reshape(len(rho), 3, w_terms, -1)
+    w = spectral_operator.group_w(rho, points, w_terms)
+    return spectral_operator.RingIntegrals(points, quadratures, at_nodes(integrand.reflectance, rho, w, quadratures))
 
 
 @dataclass(frozen=True)
