@@ -74,6 +74,7 @@
 #include "common.cl"
 #define CHUNK 24  /* points whose G waits in the nearest cache: 8 nodes of w take 24 KiB */
 #define REGISTER NAME(float, WIDTH)
+#define W_PAIR 2  /* terms in w that are summed at once: eight sums of 8 floats hide an addition's latency */
 #define W_LANES 4 /* nodes of w in a vector of build_operator */
 
 typedef struct {
@@ -306,15 +307,20 @@ static APART void accumulate_xyz(const float16 (*g)[HALVES], const int points, c
 static APART void write_terms(const float16 (*xyz)[HALVES], __global const float *to_w_terms, const int w_terms,
                               const int tile, const int tiles, __global float *ring) {
     ROLLED for (int c = 0; c < CHANNELS; ++c)
-        ROLLED for (int k = 0; k < w_terms; ++k) {
-            float16 a = 0.0f, b = 0.0f;
-            ROLLED for (int m = 0; m < w_terms; ++m) {
-                a = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][0], a);
-                b = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][1], b);
+        ROLLED for (int k = 0; k < w_terms; k += W_PAIR) {
+            float16 sum[W_PAIR][HALVES];
+            UNROLL for (int i = 0; i < W_PAIR; ++i) sum[i][0] = sum[i][1] = 0.0f;
+            ROLLED for (int m = 0; m < w_terms; ++m)
+                UNROLL for (int i = 0; i < W_PAIR; ++i) {
+                    const float16 factor = to_w_terms[(k + i) * w_terms + m];
+                    sum[i][0] = fma(factor, xyz[c * w_terms + m][0], sum[i][0]);
+                    sum[i][1] = fma(factor, xyz[c * w_terms + m][1], sum[i][1]);
+                }
+            UNROLL for (int i = 0; i < W_PAIR; ++i) {
+                const int row = HALVES * tiles * (c * w_terms + k + i);
+                vstore16(sum[i][0], row + tile, ring);
+                vstore16(sum[i][1], row + tile + tiles, ring);
             }
-            const int row = HALVES * tiles * (c * w_terms + k);
-            vstore16(a, row + tile, ring);
-            vstore16(b, row + tile + tiles, ring);
         }
 }
 

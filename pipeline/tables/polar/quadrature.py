@@ -26,9 +26,9 @@ _STEP_OF_DAYLIGHT_NM = 4.0
 # the squared autocorrelation of the window, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
 _REACH_SIGMAS, _POINTS = 4.0, 48
 _GRID_POINTS = 256
-# multiply-adds of a matrix product that BLAS leaves on one thread: its threads wait for each other at a barrier, on
-# busy cores up to 40 ms for a product of 0.4 ms (801 wavelengths)
-_PRODUCT = 2**17
+# complex multiply-adds of a product that OpenBLAS leaves on one thread (below 2^16): threads wait for each other at a
+# barrier, on busy cores up to 40 ms for a product of 0.4 ms (801 wavelengths)
+_PRODUCT = 2**15
 
 
 def choose(

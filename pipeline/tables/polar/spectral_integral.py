@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import spectral_operator
+from kernels.spectral_operator import LinePoints
 from pipeline import resources
 from pipeline.arrays import Array
 from pipeline.optics.brdf import grey
@@ -64,32 +65,25 @@ def integrate_all(
     the last bit as alone. Raises ResourceError if the weights over s do not fit into memory. See
     docs/spectral_operator.md.
     """
-    of, found = (power, radius_per_um, s_max_per_um, rho), []
-    lights = [_on_rings(*of, integrand, w_terms) for integrand in integrands]
-    at_once = spectral_operator.most_lights(w_terms)
+    s_nodes, of = power.shape[2], (radius_per_um, s_max_per_um, rho)
+    points = [line_points.choose(radius_per_um, s_nodes, *of[1:], each.quadratures) for each in integrands]
+    resources.require(
+        "the weights of the spectral integral",
+        4 * sum(len(each.place) for each in points) * s_nodes * w_terms,
+        "lower the heights (a scan's outliers: surface.clip_percentile) or raise accuracy.delta_e",
+    )
+    lights = [_on_rings(rho, *each, w_terms) for each in zip(points, integrands, strict=True)]
+    found, at_once = [], spectral_operator.most_lights(w_terms)
     for first in range(0, len(lights), at_once):
-        found += [*spectral_operator.integrate(*of, lights[first : first + at_once])]
+        found += [*spectral_operator.integrate(power, *of, lights[first : first + at_once])]
     return [terms.reshape(len(rho), 3, w_terms, -1) for terms in found]
 
 
-def _on_rings(
-    power: NDArray[np.float32],
-    radius_per_um: Array,
-    s_max_per_um: float,
-    rho: Array,
-    integrand: Integrand,
-    w_terms: int,
-) -> spectral_operator.RingIntegrals:
-    """Chooses a light's points, and computes its reflectance."""
-    s_nodes, quadratures = power.shape[2], integrand.quadratures
-    points = line_points.choose(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
-    resources.require(
-        "the weights of the spectral integral",
-        4 * len(points.place) * s_nodes * w_terms,
-        "lower the heights (a scan's outliers: surface.clip_percentile) or raise accuracy.delta_e",
-    )
+def _on_rings(rho: Array, points: LinePoints, integrand: Integrand, w_terms: int) -> spectral_operator.RingIntegrals:
+    """Computes a light's reflectance where the rings take E."""
     w = spectral_operator.group_w(rho, points, w_terms)
-    return spectral_operator.RingIntegrals(points, quadratures, at_nodes(integrand.reflectance, rho, w, quadratures))
+    reflected = at_nodes(integrand.reflectance, rho, w, integrand.quadratures)
+    return spectral_operator.RingIntegrals(points, integrand.quadratures, reflected)
 
 
 @dataclass(frozen=True)
