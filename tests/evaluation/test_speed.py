@@ -105,8 +105,8 @@ def test_the_stacks_transforms_agree(case: Setting) -> None:
 def test_of_two_bakes_the_better_times_count() -> None:
     of = CASES["plain"]
     baked = polar_bake.bake(setting.make(*of, PolarLayout(rings=24, azimuths=96)), 1)
-    slow = replace(baked, stages=Stages(1.0, 1.0, 1.0), second_light_s=9.0, kernel_s={"a": 1.0, "b": 4.0})
-    fast = replace(baked, stages=Stages(0.1, 2.0, 0.1), second_light_s=None, kernel_s={"a": 3.0, "b": 2.0})
+    slow = replace(baked, stages=Stages(1.0, 1.0, 1.0), lights_s=(4.0, 13.0), kernel_s={"a": 1.0, "b": 4.0})
+    fast = replace(baked, stages=Stages(0.1, 2.0, 0.1), lights_s=None, kernel_s={"a": 3.0, "b": 2.0})
     for found in (polar_bake.best(slow, fast), polar_bake.best(fast, slow)):
         assert found.stages.total == pytest.approx(2.2)
         assert found.second_light_s == 9.0
