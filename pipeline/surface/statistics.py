@@ -79,10 +79,10 @@ def measuring_bytes(extent: Extent, lambda_min_nm: float) -> int:
     """Computes the memory in which `measure` works, bytes.
 
     The square deviations of `np.std`, or, in `periods`, the half of the transform along x that views can reach and
-    nine arrays of the frequencies that they can reach.
+    eight arrays of the frequencies that they can reach.
     """
     share_x, share_y = (min(1.0, 2.0 * pitch * 2e3 / lambda_min_nm) for pitch in extent.pitch_um)
-    return 8 * round(extent.samples * max(1.0, share_x + 9 * share_x * share_y))
+    return 8 * round(extent.samples * max(1.0, share_x + 8 * share_x * share_y))
 
 
 def _seam_energy(heights: Array) -> float:
