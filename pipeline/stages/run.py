@@ -8,7 +8,7 @@ from threading import Thread
 from typing import Any
 
 from kernels.device import default_device
-from pipeline import layouts
+from pipeline import layouts, resources
 from pipeline.config.models import Config
 from pipeline.diffraction.device import require_device
 from pipeline.progress import Progress, silent
@@ -180,6 +180,13 @@ def require_memory(config: Config, steps: list[Step], store: Store, largest_buff
     to_do = [step.stage.name for step in steps if not store.has(step.stage.name, step.key)]
     if to_do:
         forecast.require_memory(config, summaries(steps, store), to_do, largest_buffer)
+
+
+def fits(config: Config, steps: list[Step], store: Store, held_bytes: int) -> bool:
+    """Says whether every step that is to do fits into memory beside objects of `held_bytes`, as far as is known."""
+    needs, most = forecast.needs(config, summaries(steps, store)), resources.limit().bytes
+    to_do = [needs[step.stage.name] for step in steps if not step.cached and step.stage.name in needs]
+    return all(need.bytes + held_bytes <= most for need in to_do)
 
 
 def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:
