@@ -23,6 +23,8 @@ from pipeline.store import digest
 from pipeline.tables.evaluate import Evaluator, table_evaluator
 
 REPORT = "report.html"
+# of one reflectance, s
+_METAL_S = 7e-8
 
 
 def _parameters(config: Config) -> dict[str, Any]:
@@ -141,7 +143,9 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     )
     # the rows of a map share sums over columns
     shared = (2 * reference.stack.reach[1] + 1) / 2
-    seconds = sizes.study.seconds + (lights + 0.05) * reference.seconds(views, wavelengths) / shared
+    # Fresnel's equations of a metal at every view and wavelength
+    metal = _METAL_S * views * wavelengths if config.material.fresnel == "conductor" else 0.0
+    seconds = sizes.study.seconds + (lights + 0.05) * (reference.seconds(views, wavelengths) / shared + metal)
     return Need({**base("validate"), **kept, **foreseen.held(), **arrays}, seconds, sizes.study.buffer)
 
 
