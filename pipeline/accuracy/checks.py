@@ -1,7 +1,5 @@
 """Errors of a table against the exact reference, on random directions and on maps."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,7 +7,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import Reference, power_direct
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_DELTA_E, FLANK_RU, FLANK_WIDTHS, lobe_width
@@ -17,7 +15,6 @@ from pipeline.optics.colour import ColourError, colour_error, colour_errors, del
 from pipeline.optics.light import trapezoid
 from pipeline.optics.random_directions import flank_pairs, random_pairs
 from pipeline.progress import Progress, silent
-from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import Evaluator, Map, never_negative
 
 # the map over which this project states colour errors: 301 x 301 inside radius 0.98
@@ -294,9 +291,9 @@ def check_table(
     windows = reference.places.count
     random, flank = random_pairs(config.scene, random_directions(windows), _SEED), _flank_pairs(config, windows)
     wi, wr = (np.concatenate(both) for both in zip(random, flank, strict=True))
-    truth, middle = reference.xyz_and_middle(config.light, config.material, wi, wr, uvw, nodes)
+    (truth,), middle = reference.xyz_and_middle([(config.light, config.material)], wi, wr, uvw, nodes)
     fast = middle[direction, node]
-    direct = _direct_sums(reference.field, config.coherence.sigma_um, uvw, nodes[node])
+    direct = reference.direct(uvw, nodes[node])
     known = np.isfinite(direct)
     if np.max(np.abs(fast - direct)[known]) > _REFERENCE_TOLERANCE:
         raise AccuracyError(
@@ -307,10 +304,3 @@ def check_table(
     found, count = interpolate(wi, wr), len(random[0])
     beside = _flank(found[count:], truth[count:], config, *flank) if len(flank[0]) else None
     return _compared(found[:count], truth[:count], config, *random), beside, checked
-
-
-def _direct_sums(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: Array) -> Array:
-    """Computes |P|^2 (directions,) by plain sums, each direction at its own wavelength and in its own thread."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(lambda one, nm: power_direct(field, sigma_um, one[None], float(nm))[0], uvw, lambda_nm)
-        return np.array(list(found))

@@ -7,12 +7,12 @@ from threading import Thread
 from typing import Any
 
 from kernels.device import default_device
-from pipeline import layouts
+from pipeline import layouts, resources
 from pipeline.config.models import Config
 from pipeline.diffraction.device import require_device
 from pipeline.progress import Progress, silent
 from pipeline.resources import Need
-from pipeline.stages import bundle, forecast, provenance, validate
+from pipeline.stages import bundle, cost, forecast, provenance, validate
 from pipeline.stages.render import RENDER
 from pipeline.stages.session import Session
 from pipeline.stages.stage import Inputs, Stage, Summary
@@ -47,11 +47,18 @@ class Step:
 
 @dataclass(frozen=True)
 class Explanation:
-    """The reason why a step is cached or to do, and its cost, as texts; and what it needs, None where unknown."""
+    """The reason why a step is cached or to do, and its work, as texts; and predictions, None where unknown.
+
+    need: its memory. seconds, bytes: predicted time, s, and size of its artifact. delta_e: mean CIELAB error that is
+    expected of the table, in the step that makes it.
+    """
 
     reason: str
-    cost: str
+    work: str
     need: Need | None
+    seconds: float | None
+    bytes: int | None
+    delta_e: float | None
 
 
 def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
@@ -67,22 +74,28 @@ def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
 
 
 def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
-    """Explains each step of a plan: why it is cached or to do, its cost and its memory.
+    """Explains each step of a plan: why it is cached or to do, and its time, memory, bytes and error.
 
-    Reads the records of the whole store, and a scan that no stage has read.
+    Reads the records of the whole store, and a scan that no stage has read. Measures the pace of this machine where
+    the store does not know it.
 
     config: the config of the plan. steps: the plan.
     Returns one explanation per step.
     """
     earlier = store.artifacts()
     made = {step.stage.name for step in steps if not step.cached}
-    needs = forecast.needs(config, summaries(steps, store), reads=True)
+    foreseen, machine = forecast.outcome(config, summaries(steps, store)), cost.machine(store)
     explanations = []
     for step in steps:
-        last = _latest(earlier, step.stage.name, config.name)
-        reason = UNCHANGED if step.cached else _reason(step.stage, config, made, last)
-        need = needs.get(step.stage.name)
-        explanations.append(Explanation(reason, _cost(step.stage, config, last, need), need))
+        name = step.stage.name
+        reason = UNCHANGED
+        if not step.cached:
+            reason = _reason(step.stage, config, made, _latest(earlier, name, config.name))
+        need = foreseen.needs.get(name)
+        seconds = None if need is None else machine.seconds(name, need)
+        error = foreseen.delta_e if name == "table" else None
+        work = step.stage.work(config)
+        explanations.append(Explanation(reason, work, need, seconds, foreseen.written.get(name), error))
     return explanations
 
 
@@ -195,6 +208,13 @@ def require_memory(config: Config, steps: list[Step], store: Store, largest_buff
         forecast.require_memory(config, summaries(steps, store), to_do, largest_buffer)
 
 
+def fits(config: Config, steps: list[Step], store: Store, held_bytes: int) -> bool:
+    """Says whether every step that is to do fits into memory beside objects of `held_bytes`, as far as is known."""
+    needs, most = forecast.needs(config, summaries(steps, store)), resources.limit().bytes
+    to_do = [needs[step.stage.name] for step in steps if not step.cached and step.stage.name in needs]
+    return all(need.bytes + held_bytes <= most for need in to_do)
+
+
 def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:
     """Returns the summaries of those steps of a plan whose artifacts are in the store, by stage."""
     made = [step for step in steps if store.has(step.stage.name, step.key)]
@@ -254,14 +274,3 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
         return []
     values = f" {before} -> {now}"
     return [path + (values if len(values) < 40 else "")]
-
-
-def _cost(stage: Stage, config: Config, last: Artifact | None, need: Need | None) -> str:
-    """Describes the work of a stage, and the time that it took last, in s, or an estimate of it."""
-    parts = [text for text in [stage.work(config)] if text]
-    seconds = None if last is None else last.record.get("provenance", {}).get("seconds")
-    if seconds is not None:
-        parts.append(f"{seconds:.1f} s last time")
-    elif need is not None:
-        parts.append(f"about {max(need.seconds, 0.1):.1g} s")
-    return ", ".join(parts) or "unknown before it has run once"

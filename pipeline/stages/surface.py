@@ -168,11 +168,12 @@ def of(inputs: Inputs) -> HeightField:
 
 
 def reference_of(config: Config, inputs: Inputs, progress: Progress) -> Reference:
-    """Returns the exact reference of the height field, which the stages table, validate and bundle share."""
-    # it has no artifact, so that a session drops it before the next config, whose first stages are not predicted to
-    # hold it
-    address = f"reference of {inputs['surface'].key}"
-    return inputs.session.get(address, lambda: exact.reference_of(of(inputs), config, progress))
+    """Returns the exact reference of the height field, which stages share, and configs that differ in light only."""
+    session = inputs.session
+    name = f"reference of {inputs['surface'].key}"
+    reference = session.derived(name, lambda: exact.reference_of(of(inputs), config, progress))
+    reference.following = [(one.light, one.material) for one in session.following]
+    return reference
 
 
 def load(artifact: Artifact) -> HeightField:

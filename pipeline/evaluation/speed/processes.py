@@ -63,15 +63,15 @@ class Spent:
         return f"{told} s; {self.cpu_s:.2f} s of processors"
 
 
-def run(words: Sequence[str], config: Path, cache: Path | None = None, until: str | None = None) -> Spent:
-    """Run a config with an empty store.
+def run(words: Sequence[str], configs: Sequence[Path], cache: Path | None = None, until: str | None = None) -> Spent:
+    """Run configs with an empty store.
 
     words: those that start the tool, before the name of a command. cache: folder of caches, kernels included; None
     for the user's own. until: the last stage; None for all. Raises RunFailedError.
     """
     environment = dict(os.environ) if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
     with scratch.temporary() as folder:
-        command = [*words, "run", str(config), "--store", f"{folder}/store", "--out", f"{folder}/out"]
+        command = [*words, "run", *map(str, configs), "--store", f"{folder}/store", "--out", f"{folder}/out"]
         command += [] if until is None else ["--until", until]
         before, started = getrusage(RUSAGE_CHILDREN), time.perf_counter()
         ended = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment, text=True)
@@ -97,7 +97,7 @@ def warm_run(command_line: Sequence[str], config: Path, progress: Progress = sil
     """
     runs = []
     for i in range(_WHOLE_RUNS):
-        runs.append(run(command_line, config, until="table"))
+        runs.append(run(command_line, [config], until="table"))
         progress("whole runs", (i + 1) / _WHOLE_RUNS)
     return min(runs[1:], key=lambda each: each.seconds)
 
@@ -127,7 +127,7 @@ def measure_compiling(command_line: Sequence[str], progress: Progress = silent) 
         first, other = write_config(root, "first", _FIRST), write_config(root, "next", _NEXT)
 
         def cpu_s(path: Path) -> float:
-            spent = run(command_line, path, cache, until="table").cpu_s
+            spent = run(command_line, [path], cache, until="table").cpu_s
             progress("compiling", next(done) / 8.0)
             return spent
 
@@ -146,7 +146,7 @@ def measure_compiling(command_line: Sequence[str], progress: Progress = silent) 
         warm_next = min(cpu_s(other), cpu_s(other))
         forget_kernels()
         bakes = [
-            run(command_line, write_config(root, name, text), cache).seconds
+            run(command_line, [write_config(root, name, text)], cache).seconds
             for name, text in (("elaphe", _FIRST_BAKE), ("xenopeltis", _SECOND_BAKE))
         ]
     return Compiling(cold - warm, max(cold_next - warm_next, 0.0), *bakes)

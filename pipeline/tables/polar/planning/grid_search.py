@@ -20,7 +20,7 @@ from pipeline.tables.polar.planning.anisotropy import anisotropy
 from pipeline.tables.polar.planning.probes import FlankProbes, Probes
 from pipeline.tables.polar.planning.trial import Trial
 
-_GRID_SHARE = 0.65  # share of the budget for the error at the test directions
+GRID_SHARE = 0.65  # share of the budget for the error at the test directions
 # start of the search: the grid that keeps a dE of 0.1 on snake scans with sigma = 16.25 um
 _BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0253, 0.12
 # distances of the innermost rings among which the search chooses, in widths of the specular lobe at the shortest
@@ -170,7 +170,7 @@ class GridSearch:
 
         rings, azimuths: where the search starts. Returns both numbers and the error at the test directions.
         """
-        target = _GRID_SHARE * self._delta_e
+        target = GRID_SHARE * self._delta_e
         errors = {}
 
         def error(r: int, a: int) -> float:
