@@ -15,8 +15,8 @@ from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_DELTA_E, FLANK_RU, FLANK_WIDTHS, lobe_width
 from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import flank_pairs, random_pairs
 from pipeline.progress import Progress, silent
+from pipeline.scene.pairs import flank_pairs, random_pairs
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import Evaluator, Map, never_negative
 

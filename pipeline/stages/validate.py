@@ -52,13 +52,14 @@ def _measured(
     # errors are those of the textures that a bundle holds; settings are varied of the table that they are made of
     evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
     reference = surface.reference_of(config, inputs, progress)
-    radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
+    exposures = (config.render.exposure_ru, config.accuracy.exposure_ru)
     first = render.light_direction(config.render.lights[0])
-    study = layout.study(config, inputs, baked, convergence.CoarseMap(reference, config, first, radius))
+    radii = [render.map_radius(config, light) for light in config.render.lights]
+    study = layout.study(config, inputs, baked, convergence.CoarseMap(reference, config, first, radii[0]))
     curves = _curves(study, progress)
     drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
     maps: list[dict[str, Any]] = []
-    for light in config.render.lights:
+    for light, radius in zip(config.render.lights, radii, strict=True):
         towards, named = render.light_direction(light), f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
         check = checks.check_map(evaluate, reference, config, towards, radius, progress)
         picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
