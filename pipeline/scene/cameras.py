@@ -36,6 +36,11 @@ class Camera(Validated):
             raise ValueError("expected a target beside the position, and an up that is not along the view; set up")
         return self
 
+    @property
+    def pixel_sr(self) -> float:
+        """The solid angle of a pixel in the middle of the picture, sr."""
+        return float((2.0 * np.tan(0.5 * np.radians(self.fov_deg)) / self.size[1]) ** 2)
+
     def rays(self, column: Array, row: Array) -> tuple[Array, Array]:
         """Computes the rays through points of the raster.
 

@@ -73,6 +73,8 @@ def read(mesh: Mesh) -> Surface:
     not say where the scan's +x lies.
     """
     parts = [_placed(part, turn) for part, turn in _parts(Path(mesh.path))]
+    if not parts:
+        raise ValueError("expected a mesh of triangles, got none")
     counts = np.cumsum([0, *(len(vertices) for vertices, *_ in parts)])
     vertices = np.concatenate([part[0] for part in parts])
     faces = np.concatenate([part[1] + start for part, start in zip(parts, counts[:-1], strict=True)])

@@ -33,7 +33,8 @@ class Seen:
     """What rays meet, one entry per ray.
 
     frame: rows x, y, z of the sample's frame in the scene's (n, 3, 3), NaN where a ray meets nothing or the surface's
-    back. wr: unit vectors towards the camera in the sample's frame (n, 3). point: in the scene's frame (n, 3).
+    back. wr: unit vectors towards the camera in the sample's frame (n, 3). point: in the scene's frame (n, 3); finite
+    also where the front has no frame.
     """
 
     frame: Array
@@ -122,6 +123,10 @@ def _raster(scene: Scene, camera: Camera, number: int, step: int) -> Raster:
     row, column = (step * (grid.ravel() + 0.5) for grid in np.indices((rows, columns), np.float64))
     rays, solid_angle = camera.rays(column, row)
     seen = _meet(camera, surface_of(scene), scene.sample, rays)
+    if scene.mesh is not None and not np.isfinite(seen.frame).any() and np.isfinite(seen.point).any():
+        raise UnseenError(
+            "mesh.along", "expected a direction in the surface, got one that is normal to all that is seen"
+        )
     if not seen.met.any():
         what = "flat sample" if scene.mesh is None else "front of the mesh"
         raise UnseenError(f"cameras.{number}", f"expected a view of the {what}, but none of its pixels meets it")
@@ -137,7 +142,8 @@ def _meet(camera: Camera, surface: mesh.Surface | None, sample: tuple[float, flo
     hit = np.flatnonzero(triangle >= 0)
     point, normal, along, flat = surface.at(origin, rays[hit], triangle[hit])
     frame = _frames(normal, along)
-    frame[np.sum(flat * rays[hit], axis=1) >= 0.0] = np.nan
+    back = np.sum(flat * rays[hit], axis=1) >= 0.0
+    frame[back], point[back] = np.nan, np.nan
     return _spread(len(rays), hit, frame, -rays[hit], point)
 
 
@@ -153,7 +159,8 @@ def _meet_flat(origin: Array, rays: Array, sample: tuple[float, float]) -> Seen:
 def _spread(count: int, hit: np.ndarray, frame: Array, towards: Array, point: Array) -> Seen:
     """Arranges what was met by ray; views below the horizon of their frame meet nothing."""
     local = np.einsum("nij,nj->ni", frame, towards)
-    local[~(local[:, 2] > 0.0)] = np.nan
+    below = ~(np.isfinite(local).all(axis=1) & (local[:, 2] > 0.0))
+    local[below], frame[below] = np.nan, np.nan
     frames, views, points = np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan), np.full((count, 3), np.nan)
     frames[hit], views[hit], points[hit] = frame, local, point
     return Seen(frames, views, points)
