@@ -66,9 +66,10 @@ def _measured(
         drawn[f"comparison_{render.map_name(light)}"] = picture
         errors = {key: [asdict(error) for error in getattr(check, key)] for key in ("colour", "largest")}
         maps.append({**light.model_dump(), **errors})
+    certificate = inputs.summary("textures")["certificate"]
     results: Summary = {
-        # both were measured for the certificate
-        **{name: inputs.summary("textures")["certificate"][name] for name in ("reference", "random", "flank")},
+        # these were measured for the certificate
+        **{name: certificate[name] for name in ("reference", "random", "flank", "border")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
@@ -131,4 +132,4 @@ def _work(config: Config) -> str:
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render")
-    return Stage("validate", 8, inputs, _parameters, _produce, uses_device=True, work=_work)
+    return Stage("validate", 9, inputs, _parameters, _produce, uses_device=True, work=_work)
