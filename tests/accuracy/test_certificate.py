@@ -44,7 +44,7 @@ def test_lights_whose_mirror_direction_is_not_seen_have_no_flank() -> None:
 
 
 def test_a_scene_has_a_border_where_a_table_errs_more_and_which_is_measured_apart() -> None:
-    """The spline is mirrored at the last ring, where the largest |(u, v)| of a scene lies: 0.20 there, 0.06 on all."""
+    """The spline is mirrored at the last ring, at the largest |(u, v)| of a scene: 0.20 there, 0.06 on all."""
     found = config(scene={"lights": [{"kind": "sun", "theta_deg": 30}], "views": {"theta_max_deg": 40}})
     table, _ = planned(found)
     border = check_border(table_evaluator(table, found.radiometry), exact_of(found), found)

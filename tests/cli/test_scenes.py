@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from tests.cli.test_polar import write
 from tests.cli.tool import Tool
 from tests.scene.scenes import latlong, write_environment
 from tests.scene.tube import write_obj
@@ -16,10 +17,10 @@ def test_a_mesh_under_the_sun_is_baked_and_certified(tool: Tool) -> None:
     """The snake-like tube of docs/usage.md: its certificate is over what the camera sees, and over its border."""
     write_obj(tool.folder / "tube.obj")
     scene = {"lights": [{"kind": "sun", "theta_deg": 20}], "cameras": [CAMERA], "mesh": {"path": "tube.obj"}}
-    result = tool("run", tool.config(scene=scene), "--json")
+    result = tool("run", write(tool, scene=scene), "--json")
     assert result.code == 0, result.stderr
     certificate = json.loads(result.stdout)[0]["stages"]["textures"]["summary"]["certificate"]
-    assert certificate["measured"] <= 0.1
+    assert certificate["measured"] <= certificate["delta_e"] == 0.5
     assert certificate["random"]["directions"] == 2000
     assert certificate["border"]["directions"] > 0
 
