@@ -58,21 +58,23 @@ def _measured(
     # errors are those of the textures that a bundle holds; settings are varied of the table that they are made of
     evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
     reference = surface.reference_of(config, inputs, progress)
-    radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
+    exposures = (config.render.exposure_ru, config.accuracy.exposure_ru)
+    radii = [render.map_radius(config, light) for light in config.render.lights]
     studied, compute = _name_of_curves(layout, config, inputs), partial(_curves, layout, config, inputs, baked)
     curves = inputs.session.derived(studied, lambda: compute(reference, progress)).value
     drawn["convergence"] = drawing.submit(_once, inputs, f"plot of {studied}", "convergence", curves, exposures[1])
     maps: list[dict[str, Any]] = []
-    for light in config.render.lights:
+    for light, radius in zip(config.render.lights, radii, strict=True):
         towards, named = render.light_direction(light), f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
         check = checks.check_map(evaluate, reference, config, towards, radius, progress)
         picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
         drawn[f"comparison_{render.map_name(light)}"] = picture
         errors = {key: [asdict(error) for error in getattr(check, key)] for key in ("colour", "largest")}
         maps.append({**light.model_dump(), **errors})
+    certificate = inputs.summary("textures")["certificate"]
     results: Summary = {
-        # both were measured for the certificate
-        **{name: inputs.summary("textures")["certificate"][name] for name in ("reference", "random", "flank")},
+        # these were measured for the certificate
+        **{name: certificate[name] for name in ("reference", "random", "flank", "border")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
@@ -104,8 +106,10 @@ def _curves(
     layout: Layout, config: Config, inputs: Inputs, baked: Evaluator, reference: Reference, progress: Progress
 ) -> Small[list[convergence.Curve]]:
     """Computes the error against each setting of the table, on a coarse map under the first light."""
-    studied, light = layout.studied(config), render.light_direction(config.render.lights[0])
-    coarse = convergence.CoarseMap(reference, studied, light, render.map_radius(config))
+    studied, first = layout.studied(config), config.render.lights[0]
+    coarse = convergence.CoarseMap(
+        reference, studied, render.light_direction(first), render.map_radius(config, first)
+    )
     study, curves = layout.study(studied, inputs, baked, coarse), []
     for i, setting in enumerate(study):
         curves.append(setting())

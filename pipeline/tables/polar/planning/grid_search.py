@@ -13,7 +13,7 @@ import numpy as np
 from pipeline import resources
 from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
 from pipeline.optics.coherence import FLANK_DELTA_E, lobe_width
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.planning.anisotropy import anisotropy

@@ -7,15 +7,14 @@ exponential (Jacobi-Anger expansion). The grid depends on the surface and is sea
 from dataclasses import dataclass
 from math import ceil
 
-import numpy as np
-
 from pipeline.diffraction import expansion, power_spectrum
-from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, Rings
+from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
-from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
+from pipeline.scene.model import Scene
+from pipeline.scene.visited import rho_max
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
 from pipeline.tables.polar.bake import PolarBake
@@ -86,14 +85,6 @@ class Plan:
             w_terms=self.w_terms,
             quadrature_error=budget.quadrature,
         )
-
-
-def rho_max(scene: Scene | None) -> float:
-    """Computes the largest |(u, v)| of a scene, sin(theta_i) + sin(theta_r); 2 without a scene."""
-    if scene is None:
-        return RHO_MAX
-    view = np.sin(np.radians(scene.views.theta_max_deg))
-    return float(min(RHO_MAX, max(np.sin(np.radians(light.theta_deg)) for light in scene.lights) + view))
 
 
 def start(
