@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cli import console, sources
+from cli import console, explain, sources
 
 if TYPE_CHECKING:
     from pipeline.batch.turns import Turn
@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 _SUMMARY = ("config", "verdict", "mean dE", "seconds", "made", "cached", "result")
 
 
-def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, until: str) -> None:
+def bake_all(
+    paths: tuple[Path, ...], out: Path, store_root: Path | None, as_json: bool, until: str, *, explains: bool = False
+) -> None:
     """Bakes configs up to a stage, and prints the errors and files of one config or the summary of several.
 
-    out: folder for the results of the stages "validate" and "bundle"; earlier stages have none.
+    out: folder for the results of the stages "validate" and "bundle"; earlier stages have none. explains: whether
+    predicted cost is shown beside the actual one.
     Raises the error of a single config. Of several, errors are printed and all configs are baked; raises
     click.exceptions.Exit with the code of the first path that failed. A missed error budget is a failure, although
     the results are written.
@@ -32,8 +35,13 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
     if until in ("validate", "bundle"):
         for config in loaded:
             scratch.require_folder(out / config.name)
-    baked = {turn.config.name: _bake(turn, out, store, until) for turn in turns(loaded, store, until)}
+    baked = {
+        turn.config.name: _bake(turn, out, store, until, explains=explains) for turn in turns(loaded, store, until)
+    }
     results = [baked[config.name] for config in loaded]
+    if explains and not as_json:
+        for result in results:
+            explain.show(result)
     if as_json:
         console.print_json(results)
     elif len(results) > 1:
@@ -70,7 +78,7 @@ def load_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[Config]":
     return [config for config, _ in seen.values()]
 
 
-def _bake(turn: "Turn", out: Path, store: Any, until: str) -> dict[str, Any]:
+def _bake(turn: "Turn", out: Path, store: Any, until: str, *, explains: bool) -> dict[str, Any]:
     """Bakes a config; returns its result as JSON, with the error in it where the config is one of several."""
     from cli import faults
     from pipeline.errors import AccuracyError
@@ -79,7 +87,7 @@ def _bake(turn: "Turn", out: Path, store: Any, until: str) -> dict[str, Any]:
     result: dict[str, Any] = {"name": config.name, "stages": {}, "files": [], "bundle": None, "error": None}
     console.note(f"{config.name}:" if is_alone else f"{config.name} ({turn.number} of {turn.count}):")
     try:
-        missed = _make(turn, out, store, until, result)
+        missed = _make(turn, out, store, until, result, explains=explains)
         if missed is not None:
             result["error"] = {"code": AccuracyError.exit_code, "lines": [missed]}
     except Exception as error:
@@ -94,16 +102,20 @@ def _bake(turn: "Turn", out: Path, store: Any, until: str) -> dict[str, Any]:
     return result
 
 
-def _make(turn: "Turn", out: Path, store: Any, until: str, result: dict[str, Any]) -> str | None:
+def _make(turn: "Turn", out: Path, store: Any, until: str, result: dict[str, Any], *, explains: bool) -> str | None:
     """Makes the stages of a config and writes them to its result; returns a message where it missed its budget."""
     from pipeline.stages import bake, run
 
     config, report = turn.config, console.step_reporter(turn.config, store)
+    explained = explain.Explained(turn, store, until) if explains else None
 
     def on_step(step: Any, seconds: float | None) -> None:
         report(step, seconds)
         summary = store.describe(step.stage.name, step.key).summary
-        result["stages"][step.stage.name] = {"key": step.key, "cached": seconds is None, "summary": summary}
+        stage = {"key": step.key, "cached": seconds is None, "summary": summary}
+        if explained is not None:
+            explained.add(step, seconds, stage)
+        result["stages"][step.stage.name] = stage
 
     with console.showing_progress() as progress:
         if until == "bundle":

@@ -19,9 +19,19 @@ from cli import console
     help="Print the JSON Schema of configs, or of a bundle's manifest.json, instead of a SOURCE.",
 )
 @click.option("--formats", is_flag=True, help="List the formats of scan files that can be read, instead of a SOURCE.")
+@click.option(
+    "--picture",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write a PNG of the (u, v) and |w| that the [scene] of a config visits.",
+)
 @console.json_option
 def inspect_command(
-    source: Path | None, channel: str | None, schema: str | None, formats: bool, as_json: bool
+    source: Path | None,
+    channel: str | None,
+    schema: str | None,
+    formats: bool,
+    picture: Path | None,
+    as_json: bool,
 ) -> None:
     """Print the content of SOURCE: a scan file, a config or a bundle's folder. Bakes nothing.
 
@@ -40,17 +50,21 @@ def inspect_command(
         return
     if source is None:
         raise click.UsageError("Missing argument 'SOURCE'; or --schema for the keys of a document")
-    if source.is_dir():
-        found = _bundle(source)
-    elif source.suffix == ".toml":
-        found = _config(source)
-    else:
-        found = _scan(source, channel)
+    found = _found(source, channel, picture)
     if as_json:
         console.print_json(found)
         return
     for key, value in found.items():
         console.say(f"{key:<16} {value if isinstance(value, str) else json.dumps(value)}")
+
+
+def _found(source: Path, channel: str | None, picture: Path | None) -> dict[str, Any]:
+    """Returns the content of a bundle, a config or a scan."""
+    if picture is not None and source.suffix != ".toml":
+        raise click.UsageError("--picture needs a config with a [scene]")
+    if source.is_dir():
+        return _bundle(source)
+    return _config(source, picture) if source.suffix == ".toml" else _scan(source, channel)
 
 
 def _print_formats(as_json: bool) -> None:
@@ -85,11 +99,26 @@ def _bundle(folder: Path) -> dict[str, Any]:
         raise DamagedError(f"{folder}: not a bundle: {error}") from None
 
 
-def _config(path: Path) -> dict[str, Any]:
+def _config(path: Path, picture: Path | None) -> dict[str, Any]:
+    """Returns a config with its defaults, and what its scene visits; draws that where a picture is named."""
     from pipeline.config import read as config_file
 
-    resolved: dict[str, Any] = config_file.load(path).model_dump(mode="json")
-    return resolved
+    config = config_file.load(path)
+    resolved: dict[str, Any] = config.model_dump(mode="json")
+    if config.scene is None:
+        if picture is not None:
+            raise click.UsageError(f"--picture needs a config with a [scene], and {path} has none")
+        return resolved
+    from pipeline.scene.summary import summary
+
+    if picture is not None:
+        from pipeline.accuracy.plots import visited_directions
+        from pipeline.store.store import writing
+
+        drawn = visited_directions(config.scene)
+        with writing(picture.parent):
+            picture.write_bytes(drawn)
+    return {**resolved, "visited": summary(config.scene)}
 
 
 def _scan(path: Path, channel: str | None) -> dict[str, Any]:

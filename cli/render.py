@@ -35,8 +35,8 @@ def render_command(
     written to OUT/NAME as EXR (linear XYZ) and PNG.
     """
     from pipeline.optics.colour import pixels
-    from pipeline.optics.scene import Direction
     from pipeline.report import images
+    from pipeline.scene.lights import Direction
     from pipeline.stages import render
     from pipeline.store import scratch
     from pipeline.store.store import writing
@@ -46,11 +46,14 @@ def render_command(
         raise click.UsageError("--phi needs --theta: give both angles of the light")
     config = sources.load(config_path)
     lights = config.render.lights if theta is None else [Direction(theta_deg=theta, phi_deg=phi or 0.0)]
-    views = Map(size or config.render.size, render.map_radius(config))
     folder, unit, made = out / config.name, config.radiometry.unit, []
     with console.showing_progress() as progress:
         evaluate = sources.config_evaluator(config, exact, store_root, progress)
-        shown = [render_map(evaluate, render.light_direction(light), views) for light in lights]
+        pixels_of = [Map(size or config.render.size, render.map_radius(config, light)) for light in lights]
+        shown = [
+            render_map(evaluate, render.light_direction(light), views)
+            for light, views in zip(lights, pixels_of, strict=True)
+        ]
     for light, image in zip(lights, shown, strict=True):
         named = f"the light {light.theta_deg:g}°, {light.phi_deg:g}°"
         sources.refuse_unreached(image, named, str(config_path))

@@ -5,7 +5,7 @@ from kernels import device
 # Bounds of what a work-item keeps, wide enough for surfaces 10 um tall; what is taller takes a program of its own.
 _MOST_BLOCKS = 16  # of 16 Chebyshev terms
 _MOST_S_NODES = 512
-_MOST_W_TERMS = 136  # a config may ask for 128, and planning looks a few further
+MOST_W_TERMS = 136  # a config may ask for 128, and planning looks a few further
 # coefficients under a window along an axis: 2e-11 on a patch of thirty sigma, the widest of a stack, takes 69
 MOST_TAPS = 69
 
@@ -22,11 +22,11 @@ def polar(term_blocks: int = 0, s_nodes: int = 0, w_terms: int = 0) -> device.Pr
     """
     constants = {
         **_stack("float", 4),
-        **device.default_device().blocks.chosen("USUAL_TAPS", "NODES", "W_BLOCK", "XYZ_HALVES"),
+        **device.default_device().blocks.chosen("USUAL_TAPS", "NODES", "W_BLOCK", "XYZ_VECTORS"),
         "LANES": LANES,
         "MOST_BLOCKS": device.bound(term_blocks, _MOST_BLOCKS),
         "MOST_S_NODES": device.bound(s_nodes, _MOST_S_NODES),
-        "MOST_W_TERMS": device.bound(w_terms, _MOST_W_TERMS),
+        "MOST_W_TERMS": device.bound(w_terms, MOST_W_TERMS),
         "MOST_TAPS": MOST_TAPS,
         "ORDER": ORDER,
         "MOST_RINGS": MOST_RINGS,

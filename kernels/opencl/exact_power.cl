@@ -50,6 +50,7 @@
 
 #include "common.cl"
 #define WAVES 4   /* wavelengths of a group: one vector of 32 bytes */
+#define MOST_VECTORS 2 /* of terms that are summed at once: both parts fill whole pairs */
 #define W_AHEAD 2 /* values of w whose Bessel functions are made at once: WAVES of each fill a vector of 64 bytes */
 #define SMALLEST_Z 1e-12    /* 2 / z must stay finite; J_n(z) is J_n(0) there, to the rounding of double */
 #define TINY 1e-280         /* where Miller's recurrence starts: what it grows by must not overflow */
@@ -63,27 +64,53 @@ static APART void window_weights(const double4 d, const double df, const double 
     weights_of_peak(peak, ratio, decay, reach, weight);
 }
 
-/* Adds sum_i weight[WAVES i] cell[i * stride + k], i < count: k < DOUBLES to low, the next DOUBLES to high. */
-static void add(__global const double *cell, const long stride, const double *weight, const int count, double8 *low,
-                double8 *high) {
-    ROLLED for (int i = 0; i < count; ++i, cell += stride) {
-        *low = fma((double8)weight[WAVES * i], vload8(0, cell), *low);
-        *high = fma((double8)weight[WAVES * i], vload8(1, cell), *high);
+/* Adds sum_i weight[WAVES (m count + i)] cell[i * stride + k] of each mode m, i < taps, k < DOUBLES * vectors, to
+ * sum[m]. What is loaded serves all modes. */
+static INLINE void add(__global const double *cell, const long stride, const double *weight, const int count,
+                       const int taps, const int modes, const int vectors, double8 (*sum)[MOST_VECTORS]) {
+    ROLLED for (int i = 0; i < taps; ++i, cell += stride, weight += WAVES)
+        UNROLL for (int v = 0; v < vectors; ++v) {
+            const double8 here = vload8(v, cell);
+            UNROLL for (int m = 0; m < modes; ++m)
+                sum[m][v] = fma((double8)weight[WAVES * m * count], here, sum[m][v]);
+        }
+}
+
+/* sum_i weights[m count + i] cells[(start + i) % count], i < count, of each mode m, for cells of `width` doubles,
+ * `stride` apart; `lane` picks the wavelength's weights. Sums of modes are `apart`; those of `vectors` of terms and all
+ * modes stay in registers. */
+static INLINE void sums(__global const double *cells, const long stride, const int start, const double4 *weights,
+                        const int lane, const int count, const int width, const int modes, const int vectors,
+                        __global double *sum, const long apart) {
+    const double *weight = (const double *)weights + lane;
+    ROLLED for (int k = 0; k < width; k += DOUBLES * vectors) {
+        double8 found[MODES][MOST_VECTORS];
+        UNROLL for (int m = 0; m < modes; ++m) UNROLL for (int v = 0; v < vectors; ++v) found[m][v] = 0.0;
+        add(cells + start * stride + k, stride, weight, count, count - start, modes, vectors, found);
+        add(cells + k, stride, weight + WAVES * (count - start), count, start, modes, vectors, found);
+        UNROLL for (int m = 0; m < modes; ++m)
+            UNROLL for (int v = 0; v < vectors; ++v) vstore8(found[m][v], v, sum + m * apart + k);
     }
 }
 
-/* sum_i weights[i] cells[(start + i) % count], i < count, for cells of `width` doubles, `stride` apart; `lane` picks
- * the wavelength's weights. */
-static void weighted_sum(__global const double *cells, const long stride, const int start, const double4 *weights,
-                         const int lane, const int count, const int width, __global double *sum) {
-    const double *weight = (const double *)weights + lane;
-    ROLLED for (int k = 0; k < width; k += 2 * DOUBLES) {
-        double8 low = 0.0, high = 0.0;
-        add(cells + start * stride + k, stride, weight, count - start, &low, &high);
-        add(cells + k, stride, weight + WAVES * (count - start), start, &low, &high);
-        vstore8(low, 0, sum + k);
-        vstore8(high, 1, sum + k);
-    }
+static APART void sums_of_one(__global const double *cells, const long stride, const int start, const double4 *weights,
+                              const int lane, const int count, const int width, __global double *sum) {
+    sums(cells, stride, start, weights, lane, count, width, 1, MOST_VECTORS, sum, 0);
+}
+
+static APART void sums_of_all(__global const double *cells, const long stride, const int start, const double4 *weights,
+                              const int lane, const int count, const int width, __global double *sum,
+                              const long apart) {
+    sums(cells, stride, start, weights, lane, count, width, MODES, 1, sum, apart);
+}
+
+/* The weighted sums of as many modes as there are: all MODES at once, or one after the other. */
+static void weighted_sums(__global const double *cells, const long stride, const int start, const double4 *weights,
+                          const int lane, const int count, const int width, const int modes, __global double *sum,
+                          const long apart) {
+    if (modes == MODES) sums_of_all(cells, stride, start, weights, lane, count, width, sum, apart);
+    else ROLLED for (int m = 0; m < modes; ++m)
+        sums_of_one(cells, stride, start, weights + m * count, lane, count, width, sum + m * apart);
 }
 
 /* The first order at which J_n(z) < 1e-16. J_n decays like an Airy function of (n - z) / z^(1/3) from n = z on; the
@@ -179,12 +206,11 @@ static APART void gather(__global const double *stack, const int columns, const 
                          const int modes_y, const double4 *along_x, const double4 *along_y, const int lane,
                          __global double *ring, __global double *f_n) {
     ROLLED for (int c = max(column, fresh); c < column + taps_x; ++c)
-        ROLLED for (int m = 0; m < modes_y; ++m)
-            weighted_sum(stack + ((long)row * columns + c) * width, (long)columns * width, 0, along_y + m * taps_y,
-                         lane, taps_y, width, ring + (m * taps_x + c % taps_x) * width);
-    ROLLED for (int m = 0; m < modes_y * modes_x; ++m)
-        weighted_sum(ring + m / modes_x * taps_x * width, width, column % taps_x, along_x + m % modes_x * taps_x, lane,
-                     taps_x, width, f_n + m * width);
+        weighted_sums(stack + ((long)row * columns + c) * width, (long)columns * width, 0, along_y, lane, taps_y, width,
+                      modes_y, ring + c % taps_x * width, (long)taps_x * width);
+    ROLLED for (int m = 0; m < modes_y; ++m)
+        weighted_sums(ring + m * taps_x * width, width, column % taps_x, along_x, lane, taps_x, width, modes_x,
+                      f_n + m * modes_x * width, width);
 }
 
 /* What is known of the stack's modes and of the part of its terms that is at hand. */

@@ -17,31 +17,35 @@
  * that follow each other share G, as a group, at nodes w_m of its first ring; what I is at nodes of a ring's own
  * follows from the polynomial through these.
  *
- * build_operator makes the weights of each group; one work-item, one group. apply_operator makes the table of one group
+ * Several lights, each with its own observer and reflectance, have weights of their own over the same points: a group
+ * serves one light, or all of those whose points are equal, and G is evaluated once for them.
+ *
+ * build_operator makes the weights of each group; one work-item, one group. apply_operator makes the tables of one group
  * at the azimuths of a tile and those half a turn on; one work-item, one group and one tile of half a turn. Arguments:
  *
  * build_operator
  *   groups         Group[groups]                      1     of rings
- *   rings          Ring[rings]                        1     of the table
+ *   rings          Ring[lights][rings]                1     of each light's table
  *   first_radius   int[points]                        1     the radius of a point, or the first of the ORDER about it,
  *                                                           which may be negative
  *   radius         double[radii]                      1/um  r_a, ascending from 0
  *   rho            double[rings]                      1     |(u, v)|
- *   stretch        double[rings]                      1     t: rho of the ring over that of its group's first
+ *   stretch        double[lights][rings]              1     t: rho of the ring over that of its group's first
  *   kappa          double[points]                     1/um  kappa_p, ascending in each group
- *   lambda_um      double[nodes]                      um    wavelengths of every ring's quadrature, ascending
+ *   lambda_um      double[nodes]                      um    wavelengths of every quadrature, ascending
  *   weights        float4[nodes]                      1     their weights in X, Y, Z; fourth unused
  *   reflectance    float[...][w_terms]                1     of the material, at each wavelength of a ring and each node
  *                                                           w_m of its group; 1 outside metals
  *   to_series      float[s_nodes][s_nodes]            1     C_j = sum_k to_series[k][j] T_k
  *   w_node         float[groups][w_terms]             1     w_m, |w| of the group's first ring
  *   s_max          float                              1/um  where the nodes of E in s end
+ *   ring_count     int                                1     rings of a table
  *   s_nodes        int                                1     nodes of E in s
  *   w_terms        int                                1     nodes w_m; a multiple of W_LANES
  *   lagrange_r     float[points][ORDER]               1     result: L_a of a point between radii
  *   cardinal_s     float[points][s_nodes][w_terms]    1     result: C_j at every w_m
- *   point_weights  float[...][CHANNELS][w_terms]      1     result: for every ring, of all points of its group
- *   used           int2[rings]                        1     result: the first point of its group that a ring takes
+ *   point_weights  float[...][CHANNELS][w_terms]      1     result: for every light's ring, of all points of its group
+ *   used           int2[lights][rings]                1     result: the first point of its group that a ring takes
  *                                                           from, and the one after the last
  *
  * apply_operator
@@ -50,27 +54,33 @@
  *   pairs          int2[tiles]                        1     where a tile of azimuths and the one that is made with it
  *                                                           lie in E: half a turn on where a ring takes radii below 0
  *   groups         Group[groups]                      1     as of build_operator
- *   rings          Ring[rings]                        1     as of build_operator
+ *   rings          Ring[lights][rings]                1     as of build_operator
  *   first_radius   int[points]                        1     as of build_operator
  *   lagrange_r     float[points][ORDER]               1     as build_operator wrote it
  *   cardinal_s     float[points][s_nodes][w_terms]    1     as build_operator wrote it
  *   point_weights  float[...][CHANNELS][w_terms]      1     as build_operator wrote it
- *   used           int2[rings]                        1     as build_operator wrote it
+ *   used           int2[lights][rings]                1     as build_operator wrote it
+ *   ring_count     int                                1     rings of a table
  *   s_nodes        int                                1     nodes of E in s
  *   w_terms        int                                1     nodes w_m, and terms of the table
- *   to_w_terms     float[rings][w_terms][w_terms]     1     Chebyshev coefficients over a ring's w from values at its
- *                                                           group's nodes, [term][node]
+ *   to_w_terms     float[lights][rings][w_terms][w_terms]   1   Chebyshev coefficients over a ring's w from values at
+ *                                                           its group's nodes, [term][node]
  *   is_summed      int                                1     whether the terms are summed at one w of each texel
- *   own_x          float[rings][HALVES * tiles][LANES]   1  argument of T_k at that w; unread where they are not
- *   table          float[rings][CHANNELS][w_terms][HALVES * tiles][LANES]   1   result; w_terms is 1 where summed
+ *   own_x          float[lights][rings][HALVES * tiles][LANES]   1   argument of T_k at that w; unread where they are
+ *                                                           not
+ *   table          float[lights][rings][CHANNELS][w_terms][HALVES * tiles][LANES]   1   result; w_terms is 1 where
+ *                                                           summed
  *
- * Set by the host: LANES, 16, azimuths of a tile; ORDER (even); MOST_RINGS of a group; MOST_S_NODES and MOST_W_TERMS,
- * which bound what a work-item keeps; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in registers; XYZ_HALVES (1 or
- * 2), tiles of azimuths whose X, Y and Z do.
+ * Set by the host: LANES, 16, azimuths of a tile; WIDTH, floats of a register; ORDER (even); MOST_RINGS of a group;
+ * MOST_S_NODES and MOST_W_TERMS, which bound what a work-item keeps: a group's lights times w_terms are at most
+ * MOST_W_TERMS; W_BLOCK (1, 2 or 4), nodes of w whose sums stay in registers; XYZ_VECTORS (1, 2 or 4), registers of
+ * azimuths whose X, Y and Z do.
  */
 
 #include "common.cl"
 #define CHUNK 24  /* points whose G waits in the nearest cache: 8 nodes of w take 24 KiB */
+#define REGISTER NAME(float, WIDTH)
+#define W_PAIR 2  /* terms in w that are summed at once: eight sums of 8 floats hide an addition's latency */
 #define W_LANES 4 /* nodes of w in a vector of build_operator */
 
 typedef struct {
@@ -78,6 +88,7 @@ typedef struct {
     int on_radii;        /* whether they lie on radii of E */
     int on_nodes;        /* whether they are the wavelengths themselves, from the last to the first, of its one ring */
     int ring, rings;     /* the first, and how many */
+    int light, lights;   /* likewise */
 } Group;
 
 typedef struct {
@@ -86,28 +97,42 @@ typedef struct {
     int reflectance;     /* where its rows of `reflectance` begin */
 } Ring;
 
+/* The row of a group's q-th ring, light by light, in arrays of every light's rings. */
+static int row_of(const Group group, const int q, const int ring_count) {
+    return (group.light + q / group.rings) * ring_count + group.ring + q % group.rings;
+}
+
 /* r of a radius by its index; E(-r, phi) = E(r, phi + pi), so radii go on below 0. */
 static double radius_at(__global const double *radius, const int i) { return i < 0 ? -radius[-i] : radius[i]; }
 
-/* Lagrange's polynomials on the ORDER nodes at `x`, at `at`. */
-static APART void lagrange(const double *x, const double at, float *weight) {
-    ROLLED for (int a = 0; a < ORDER; ++a) {
-        double above = 1.0, below = 1.0;
-        ROLLED for (int b = 0; b < ORDER; ++b) {
-            above *= a == b ? 1.0 : at - x[b];
-            below *= a == b ? 1.0 : x[a] - x[b];
-        }
-        weight[a] = above / below;
+/* Of Lagrange's polynomials on the ORDER nodes `x`, the factors that do not depend on where they are evaluated. */
+static APART void lagrange_factors(const double *x, double *factor) {
+    double below[ORDER];
+    ROLLED for (int a = 0; a < ORDER; ++a) below[a] = 1.0;
+    ROLLED for (int b = 0; b < ORDER; ++b)
+        UNROLL for (int a = 0; a < ORDER; ++a) below[a] *= a == b ? 1.0 : x[a] - x[b];
+    UNROLL for (int a = 0; a < ORDER; ++a) factor[a] = 1.0 / below[a];
+}
+
+/* Lagrange's polynomials on the ORDER nodes `x`, at `at`: products of the differences before each node and after it. */
+static APART void lagrange(const double *x, const double *factor, const double at, float *weight) {
+    double before[ORDER], after = 1.0;
+    before[0] = 1.0;
+    UNROLL for (int a = 1; a < ORDER; ++a) before[a] = before[a - 1] * (at - x[a - 1]);
+    UNROLL for (int a = ORDER - 1; a >= 0; --a) {
+        weight[a] = factor[a] * before[a] * after;
+        after *= at - x[a];
     }
 }
 
 /* L_a of a point between radii, r away from the origin. */
 static APART void radial_weights(__global const double *radius, const int first_radius, const double r,
                                  __global float *lagrange_r) {
-    double x[ORDER];
+    double x[ORDER], factor[ORDER];
     float weight[ORDER];
     ROLLED for (int a = 0; a < ORDER; ++a) x[a] = radius_at(radius, first_radius + a);
-    lagrange(x, r, weight);
+    lagrange_factors(x, factor);
+    lagrange(x, factor, r, weight);
     ROLLED for (int a = 0; a < ORDER; ++a) lagrange_r[a] = weight[a];
 }
 
@@ -145,7 +170,8 @@ static APART void sum_point_weights(const Group group, const Ring ring, const do
                                     __global const float4 *weights, __global const float *reflectance,
                                     const int w_terms, __global float *point_weights, __global int2 *used) {
     const int about = group.on_nodes ? 1 : ORDER;
-    int first = group.points - about;
+    double x[ORDER], factor[ORDER];
+    int first = group.points - about, prepared = -1;
     ROLLED for (int o = 0; o < group.points * CHANNELS * w_terms; ++o) point_weights[o] = 0.0f;
     ROLLED for (int l = 0; l < ring.count; ++l) {
         float weight[ORDER] = {1.0f};
@@ -154,9 +180,12 @@ static APART void sum_point_weights(const Group group, const Ring ring, const do
         else {
             const double at = stretch / lambda_um[ring.nodes + l];
             while (first > 0 && kappa[first + ORDER / 2 - 1] > at) --first;
-            double x[ORDER];
-            ROLLED for (int a = 0; a < ORDER; ++a) x[a] = kappa[first + a];
-            lagrange(x, at, weight);
+            if (first != prepared) {
+                ROLLED for (int a = 0; a < ORDER; ++a) x[a] = kappa[first + a];
+                lagrange_factors(x, factor);
+                prepared = first;
+            }
+            lagrange(x, factor, at, weight);
         }
         if (l == 0) used->y = first + about;
         ROLLED for (int a = 0; a < about; ++a)
@@ -171,9 +200,9 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
                              __global const double *rho, __global const double *stretch, __global const double *kappa,
                              __global const double *lambda_um, __global const float4 *weights,
                              __global const float *reflectance, __global const float *to_series,
-                             __global const float *w_node, const float s_max, const int s_nodes, const int w_terms,
-                             __global float *lagrange_r, __global float *cardinal_s, __global float *point_weights,
-                             __global int2 *used) {
+                             __global const float *w_node, const float s_max, const int ring_count, const int s_nodes,
+                             const int w_terms, __global float *lagrange_r, __global float *cardinal_s,
+                             __global float *point_weights, __global int2 *used) {
     const Group group = groups[get_global_id(0)];
     const double first_rho = rho[group.ring];
     __global const float *own_w = w_node + (long)get_global_id(0) * w_terms;
@@ -184,9 +213,11 @@ __kernel void build_operator(__global const Group *groups, __global const Ring *
         const float scale = 2.0f * 2.0f * (float)M_PI * (float)kappa[p] / s_max;
         cardinal_functions(scale, own_w, to_series, s_nodes, w_terms, cardinal_s + (long)p * s_nodes * w_terms);
     }
-    ROLLED for (int i = group.ring; i < group.ring + group.rings; ++i)
+    ROLLED for (int q = 0; q < group.lights * group.rings; ++q) {
+        const int i = row_of(group, q, ring_count);
         sum_point_weights(group, rings[i], stretch[i], kappa + group.first, lambda_um, weights, reflectance, w_terms,
                           point_weights + (long)rings[i].point_weights * CHANNELS * w_terms, used + i);
+    }
 }
 
 /* G of one point at W_BLOCK nodes of w from E at its nodes in s, for both halves. E comes from the spectrum or, between
@@ -255,25 +286,26 @@ static APART void evaluate_g(const Group group, const int from, const int to, __
     }
 }
 
-/* Accumulate X, Y and Z of one ring over `points` points, at node m of w, for both halves, XYZ_HALVES at a time:
+/* Accumulate X, Y and Z of one ring over `points` points, at node m of w, for both halves, XYZ_VECTORS at a time:
  *   xyz[c][m][h] += sum_p point_weights[p][c][m] g[p][m][h]     c channel, h half */
 static APART void accumulate_xyz(const float16 (*g)[HALVES], const int points, const int m, const int w_terms,
                                  __global const float *point_weights, float16 (*xyz)[HALVES]) {
-    ROLLED for (int first = 0; first < HALVES; first += XYZ_HALVES) {
+    ROLLED for (int first = 0; first < HALVES * LANES / WIDTH; first += XYZ_VECTORS) {
         /* a copy stays in registers */
-        float16 sum[CHANNELS][XYZ_HALVES];
+        REGISTER sum[CHANNELS][XYZ_VECTORS];
         UNROLL for (int c = 0; c < CHANNELS; ++c)
-            UNROLL for (int h = 0; h < XYZ_HALVES; ++h) sum[c][h] = xyz[c * w_terms + m][first + h];
-        ROLLED for (int p = 0; p < points; ++p)
-            UNROLL for (int h = 0; h < XYZ_HALVES; ++h) {
-                const float16 here = g[p * w_terms + m][first + h];
-                UNROLL for (int c = 0; c < CHANNELS; ++c) {
-                    const float16 weight = point_weights[(p * CHANNELS + c) * w_terms + m];
-                    sum[c][h] = fma(weight, here, sum[c][h]);
-                }
-            }
+            UNROLL for (int h = 0; h < XYZ_VECTORS; ++h)
+                sum[c][h] = ((const REGISTER *)xyz[c * w_terms + m])[first + h];
+        ROLLED for (int p = 0; p < points; ++p) {
+            const REGISTER *here = (const REGISTER *)g[p * w_terms + m] + first;
+            __global const float *weights = point_weights + p * CHANNELS * w_terms + m;
+            UNROLL for (int h = 0; h < XYZ_VECTORS; ++h)
+                UNROLL for (int c = 0; c < CHANNELS; ++c)
+                    sum[c][h] = fma((REGISTER)weights[c * w_terms], here[h], sum[c][h]);
+        }
         UNROLL for (int c = 0; c < CHANNELS; ++c)
-            UNROLL for (int h = 0; h < XYZ_HALVES; ++h) xyz[c * w_terms + m][first + h] = sum[c][h];
+            UNROLL for (int h = 0; h < XYZ_VECTORS; ++h)
+                ((REGISTER *)xyz[c * w_terms + m])[first + h] = sum[c][h];
     }
 }
 
@@ -281,15 +313,20 @@ static APART void accumulate_xyz(const float16 (*g)[HALVES], const int points, c
 static APART void write_terms(const float16 (*xyz)[HALVES], __global const float *to_w_terms, const int w_terms,
                               const int tile, const int tiles, __global float *ring) {
     ROLLED for (int c = 0; c < CHANNELS; ++c)
-        ROLLED for (int k = 0; k < w_terms; ++k) {
-            float16 a = 0.0f, b = 0.0f;
-            ROLLED for (int m = 0; m < w_terms; ++m) {
-                a = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][0], a);
-                b = fma((float16)to_w_terms[k * w_terms + m], xyz[c * w_terms + m][1], b);
+        ROLLED for (int k = 0; k < w_terms; k += W_PAIR) {
+            float16 sum[W_PAIR][HALVES];
+            UNROLL for (int i = 0; i < W_PAIR; ++i) sum[i][0] = sum[i][1] = 0.0f;
+            ROLLED for (int m = 0; m < w_terms; ++m)
+                UNROLL for (int i = 0; i < W_PAIR; ++i) {
+                    const float16 factor = to_w_terms[(k + i) * w_terms + m];
+                    sum[i][0] = fma(factor, xyz[c * w_terms + m][0], sum[i][0]);
+                    sum[i][1] = fma(factor, xyz[c * w_terms + m][1], sum[i][1]);
+                }
+            UNROLL for (int i = 0; i < W_PAIR; ++i) {
+                const int row = HALVES * tiles * (c * w_terms + k + i);
+                vstore16(sum[i][0], row + tile, ring);
+                vstore16(sum[i][1], row + tile + tiles, ring);
             }
-            const int row = HALVES * tiles * (c * w_terms + k);
-            vstore16(a, row + tile, ring);
-            vstore16(b, row + tile + tiles, ring);
         }
 }
 
@@ -318,35 +355,37 @@ static APART void write_values(const float16 (*xyz)[HALVES], __global const floa
 __kernel void apply_operator(__global const float *spectrum, const int radii, __global const int2 *pairs,
                              __global const Group *groups, __global const Ring *rings, __global const int *first_radius,
                              __global const float *lagrange_r, __global const float *cardinal_s,
-                             __global const float *point_weights, __global const int2 *used, const int s_nodes,
-                             const int w_terms, __global const float *to_w_terms, const int is_summed,
-                             __global const float *own_x, __global float *table) {
+                             __global const float *point_weights, __global const int2 *used, const int ring_count,
+                             const int s_nodes, const int w_terms, __global const float *to_w_terms,
+                             const int is_summed, __global const float *own_x, __global float *table) {
     const Group group = groups[get_global_id(0)];
     const int tile = get_global_id(1), tiles = get_global_size(1), sums = CHANNELS * w_terms;
+    const int rows = group.lights * group.rings;
     __global const float *here = spectrum + (long)pairs[tile].x * radii * s_nodes * LANES;
     __global const float *opposite = spectrum + (long)pairs[tile].y * radii * s_nodes * LANES;
 
     float16 xyz[MOST_RINGS * CHANNELS * MOST_W_TERMS][HALVES], g[CHUNK * MOST_W_TERMS][HALVES];
-    ROLLED for (int q = 0; q < group.rings * sums; ++q) xyz[q][0] = xyz[q][1] = 0.0f;
+    ROLLED for (int q = 0; q < rows * sums; ++q) xyz[q][0] = xyz[q][1] = 0.0f;
     ROLLED for (int from = 0; from < group.points; from += CHUNK) {
         const int to = min(from + CHUNK, group.points);
         evaluate_g(group, from, to, here, opposite, first_radius, lagrange_r, cardinal_s, s_nodes, w_terms, g);
-        ROLLED for (int i = 0; i < group.rings; ++i) {
-            const int2 range = used[group.ring + i];
+        ROLLED for (int q = 0; q < rows; ++q) {
+            const int i = row_of(group, q, ring_count);
+            const int2 range = used[i];
             const int first = max(from, range.x), points = min(to, range.y) - first;
-            __global const float *own = point_weights + (long)(rings[group.ring + i].point_weights + first) * sums;
+            __global const float *own = point_weights + (long)(rings[i].point_weights + first) * sums;
             if (points > 0)
                 ROLLED for (int m = 0; m < w_terms; ++m)
-                    accumulate_xyz(g + (first - from) * w_terms, points, m, w_terms, own, xyz + i * sums);
+                    accumulate_xyz(g + (first - from) * w_terms, points, m, w_terms, own, xyz + q * sums);
         }
     }
-    ROLLED for (int i = 0; i < group.rings; ++i) {
-        const long ring = group.ring + i, azimuths = HALVES * tiles * LANES;
-        __global const float *own = to_w_terms + ring * w_terms * w_terms;
+    ROLLED for (int q = 0; q < rows; ++q) {
+        const long i = row_of(group, q, ring_count), azimuths = HALVES * tiles * LANES;
+        __global const float *own = to_w_terms + i * w_terms * w_terms;
         if (is_summed)
-            write_values(xyz + i * sums, own, w_terms, own_x + ring * azimuths, tile, tiles,
-                         table + ring * CHANNELS * azimuths);
+            write_values(xyz + q * sums, own, w_terms, own_x + i * azimuths, tile, tiles,
+                         table + i * CHANNELS * azimuths);
         else
-            write_terms(xyz + i * sums, own, w_terms, tile, tiles, table + ring * sums * azimuths);
+            write_terms(xyz + q * sums, own, w_terms, tile, tiles, table + i * sums * azimuths);
     }
 }

@@ -24,8 +24,9 @@ class Certificate:
 
     delta_e: allowed mean CIELAB error; None where no budget is set. exposure_ru: exposure of both errors, RU.
     measured: mean CIELAB error at `exposure_ru`. random: the table against the reference on random directions.
-    flank: the same beside the mirror directions; None where a scene sees none of them. reference: the reference
-    against sums over samples. certifies: what these errors are of, in words.
+    flank: the same beside the mirror directions; None where a scene sees none of them. border: the same on the
+    outermost directions of a scene; None without one. reference: the reference against sums over samples.
+    certifies: what these errors are of, in words.
     """
 
     delta_e: float | None
@@ -33,6 +34,7 @@ class Certificate:
     measured: float
     random: RandomCheck
     flank: FlankCheck | None
+    border: RandomCheck | None
     reference: RelativeError
     certifies: str = CERTIFIES
 
@@ -57,10 +59,12 @@ def errors_of(
     interpolate: Evaluator, reference: Reference, config: Config, progress: Progress = silent
 ) -> Certificate:
     """Measures a table as `measure` does, and refuses no error of the table."""
-    random, flank, checked = check_table(interpolate, reference, config)
+    random, flank, border, checked = check_table(interpolate, reference, config)
     progress("reference", 1.0)
     exposure = config.accuracy.exposure_ru
-    return Certificate(config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, flank, checked)
+    return Certificate(
+        config.accuracy.delta_e, exposure, _at(random.colour, exposure), random, flank, border, checked
+    )
 
 
 def refuse_clamping(random: RandomCheck, config: Config) -> None:

@@ -1,7 +1,5 @@
 """Errors of a table against the exact reference, on random directions and on maps."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,15 +7,14 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.diffraction.reference import Reference, power_direct
+from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_DELTA_E, FLANK_RU, FLANK_WIDTHS, lobe_width
 from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import flank_pairs, random_pairs
 from pipeline.progress import Progress, silent
-from pipeline.surface.heightfield import HeightField
+from pipeline.scene.pairs import border_pairs, flank_pairs, random_pairs
 from pipeline.tables.evaluate import Evaluator, Map, never_negative
 
 # the map over which this project states colour errors: 301 x 301 inside radius 0.98
@@ -34,8 +31,8 @@ _REFERENCE_TOLERANCE = 1e-9
 
 
 def certified_directions(windows: int) -> int:
-    """Computes the number of directions of a certificate, random ones and those beside mirror directions."""
-    return random_directions(windows) + _flank_directions(windows)
+    """Computes the largest number of directions of a certificate: random ones, beside mirrors, and at a border."""
+    return random_directions(windows) + 2 * _flank_directions(windows)
 
 
 def _flank_directions(windows: int) -> int:
@@ -226,6 +223,22 @@ def _flank(interpolated: Array, truth: Array, config: Config, wi: Array, wr: Arr
     return FlankCheck(len(wi), FLANK_WIDTHS, colour, largest, colour.maximum <= FLANK_DELTA_E)
 
 
+def check_border(interpolate: Evaluator, reference: Reference, config: Config) -> RandomCheck | None:
+    """Compares a table with the reference on the outermost directions of a scene, beyond which nothing is known.
+
+    interpolate, reference: as in `check_flank`. config: its light, material, exposure and scene are read.
+    Returns None without a scene.
+    """
+    wi, wr = _border_pairs(config, reference.places.count)
+    if not len(wi):
+        return None
+    return _compared(interpolate(wi, wr), reference.xyz(config.light, config.material, wi, wr), config, wi, wr)
+
+
+def _border_pairs(config: Config, windows: int) -> tuple[Array, Array]:
+    return border_pairs(config.scene, _flank_directions(windows), _SEED + 4)
+
+
 @dataclass(frozen=True)
 class MapCheck:
     """Errors of a table against the reference on the map of one light.
@@ -272,16 +285,16 @@ def check_map(
 
 def check_table(
     interpolate: Evaluator, reference: Reference, config: Config, directions: int = 3
-) -> tuple[RandomCheck, FlankCheck | None, RelativeError]:
-    """Compares a table with the reference, as `check_random` and `check_flank` do, and the reference with plain sums.
+) -> tuple[RandomCheck, FlankCheck | None, RandomCheck | None, RelativeError]:
+    """Compares a table with the reference, as `check_random` and others do, and the reference with plain sums.
 
     The sums are those of the window in the middle, on a few directions, each at one wavelength. The reference answers
     for all at once, because it may have to make its stack for every answer.
 
     interpolate, reference: as in `check_random`. config: its light, material, scene, window and exposure are read.
     directions: number of random directions of the sums; a mirror direction is added.
-    Returns the errors of the table on random directions and on the flank of the specular lobe, and relative errors of
-    |P|^2 of the reference.
+    Returns the errors of the table on random directions, on the flank of the specular lobe and at the border of a
+    scene, and relative errors of |P|^2 of the reference.
     Raises AccuracyError where the two algorithms of the reference differ by more than 1e-9 of the mirror, because
     then no error that is measured against the reference can be trusted.
     """
@@ -293,10 +306,11 @@ def check_table(
     node = direction % len(nodes)
     windows = reference.places.count
     random, flank = random_pairs(config.scene, random_directions(windows), _SEED), _flank_pairs(config, windows)
-    wi, wr = (np.concatenate(both) for both in zip(random, flank, strict=True))
-    truth, middle = reference.xyz_and_middle(config.light, config.material, wi, wr, uvw, nodes)
+    border = _border_pairs(config, windows)
+    wi, wr = (np.concatenate(parts) for parts in zip(random, flank, border, strict=True))
+    (truth,), middle = reference.xyz_and_middle([(config.light, config.material)], wi, wr, uvw, nodes)
     fast = middle[direction, node]
-    direct = _direct_sums(reference.field, config.coherence.sigma_um, uvw, nodes[node])
+    direct = reference.direct(uvw, nodes[node])
     known = np.isfinite(direct)
     if np.max(np.abs(fast - direct)[known]) > _REFERENCE_TOLERANCE:
         raise AccuracyError(
@@ -304,13 +318,8 @@ def check_table(
             f"mirror, more than {_REFERENCE_TOLERANCE:g}; please report this config"
         )
     checked = relative_error(fast[known], direct[known], MIRROR_FLOOR)
-    found, count = interpolate(wi, wr), len(random[0])
-    beside = _flank(found[count:], truth[count:], config, *flank) if len(flank[0]) else None
-    return _compared(found[:count], truth[:count], config, *random), beside, checked
-
-
-def _direct_sums(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: Array) -> Array:
-    """Computes |P|^2 (directions,) by plain sums, each direction at its own wavelength and in its own thread."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(lambda one, nm: power_direct(field, sigma_um, one[None], float(nm))[0], uvw, lambda_nm)
-        return np.array(list(found))
+    ends = np.cumsum([len(random[0]), len(flank[0])])
+    found, exact = (np.split(values, ends) for values in (interpolate(wi, wr), truth))
+    beside = _flank(found[1], exact[1], config, *flank) if len(flank[0]) else None
+    outermost = _compared(found[2], exact[2], config, *border) if len(border[0]) else None
+    return _compared(found[0], exact[0], config, *random), beside, outermost, checked

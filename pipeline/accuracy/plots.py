@@ -6,11 +6,17 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from pipeline.accuracy.checks import MapCheck
 from pipeline.accuracy.convergence import Curve
+from pipeline.arrays import Array
 from pipeline.optics.colour import pixels
+from pipeline.scene.model import Scene
+from pipeline.scene.summary import CELLS, SAMPLES
+from pipeline.scene.visited import rho_max, visited
 from pipeline.surface.heightfield import HeightField
 
 _DPI = 110
@@ -51,13 +57,42 @@ def _axes_of_map(axes: Any, title: str) -> None:
     axes.set_yticks([-1, 0, 1])
 
 
+def visited_directions(scene: Scene) -> bytes:
+    """Plots what a scene visits: its weight over (u, v), and over |(u, v)| and |w|."""
+    found = visited(scene, SAMPLES)
+    figure = Figure(figsize=(10.0, 4.4), layout="constrained")
+    over_uv, over_w = figure.subplots(1, 2)
+    u, v, w = found.uvw.T
+    rho, weight = np.hypot(u, v), 100.0 * found.weight
+    limits = ((-2.0, 2.0), (-2.0, 2.0))
+    _weights(over_uv, np.histogram2d(u, v, CELLS, limits, weights=weight))
+    # 2 is the horizon of both directions; the second circle ends the rings of a table
+    for radius, style in ((2.0, "-"), (rho_max(scene), "--")):
+        over_uv.add_patch(Circle((0.0, 0.0), radius, fill=False, linestyle=style, color="0.4", linewidth=0.8))
+    over_uv.set(xlabel="u", ylabel="v", title="visited (u, v)", aspect="equal")
+    image = _weights(over_w, np.histogram2d(rho, np.abs(w), CELLS, ((0.0, 2.0), (0.0, 2.0)), weights=weight))
+    ring = np.linspace(0.0, 2.0, 200)
+    over_w.plot(ring, np.sqrt(4.0 - ring**2), color="0.4", linewidth=0.8)
+    over_w.set(xlabel="|(u, v)|", ylabel="|w|", title="visited |w| at each ring")
+    figure.colorbar(image, ax=over_w, label="weight of a cell (%)")
+    return png(figure)
+
+
+def _weights(axes: Any, counted: tuple[Array, Array, Array]) -> Any:
+    """Draws weights of cells (x, y), with their edges; empty cells stay white."""
+    weight, x, y = counted
+    return axes.pcolormesh(x, y, np.where(weight > 0.0, weight, np.nan).T, norm=LogNorm(), cmap="viridis")
+
+
 def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
     """Plots the map of one light: reference, table, and the CIELAB error between them.
 
     show_ru: exposure of the two maps, RU. error_ru: exposure of the error, RU. light: its name for the titles.
     """
-    figure = Figure(figsize=(11.0, 3.7), layout="constrained")
+    # a constrained layout would take as long as the drawing
+    figure = Figure(figsize=(11.0, 3.7))
     panels = figure.subplots(1, 3)
+    figure.subplots_adjust(left=0.05, right=0.92, bottom=0.13, top=0.9, wspace=0.25)
     extent = (-1, 1, -1, 1)
     for axes, image, name in zip(panels, (check.reference, check.table), ("reference", "table"), strict=False):
         axes.imshow(pixels(image, show_ru), extent=extent)
@@ -67,7 +102,7 @@ def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str)
         error, extent=extent, cmap="magma", vmin=0.0, vmax=max(1e-3, np.nanpercentile(error, 99.5))
     )
     _axes_of_map(panels[2], f"CIELAB error, {error_ru:g} RU")
-    figure.colorbar(shown, ax=panels[2], label="ΔE*ab (1976)")
+    figure.colorbar(shown, cax=figure.add_axes((0.935, 0.13, 0.012, 0.77)), label="ΔE*ab (1976)")
     return png(figure)
 
 

@@ -29,7 +29,8 @@ def turns(configs: Sequence[Config], store: Store, until: str = "bundle") -> Ite
     Configs follow by name, except that those of one surface follow its first config, those of the same power spectrum
     or stack the first of these, and so on through the stages. The addresses of a stage's inputs are part of its own
     address, so a config shares nothing with those before that it does not share with the one right before. Objects
-    that a config does not need are dropped when its turn comes: no stage holds more than in a run of one config.
+    that a config does not need are dropped when its turn comes. The exact reference and the curves of `validate` stay
+    while configs share the transform of the surface, and while the stages of the next fit into memory beside them.
 
     configs: of different names, in any order. store: the store of artifacts. until: name of the last stage.
     """
@@ -39,7 +40,11 @@ def turns(configs: Sequence[Config], store: Store, until: str = "bundle") -> Ite
         for address in addresses[name]:
             first.setdefault(address, name)
     ordered = sorted(configs, key=lambda config: [*(first[a] for a in addresses[config.name]), config.name])
-    session = Session()
+    session, before = Session(), ""
     for number, config in enumerate(ordered, 1):
-        session.retain(addresses[config.name])
+        transform = addresses[config.name][:2][-1]
+        fits = run.fits(config, run.plan(config, store, until), store, session.derived_bytes)
+        session.retain(addresses[config.name], derived=transform == before and fits)
+        session.following = [later for later in ordered[number:] if addresses[later.name][:2][-1] == transform]
+        before = transform
         yield Turn(config, number, len(ordered), session)

@@ -11,9 +11,9 @@ from pipeline.bundle.document import MANIFEST
 from pipeline.bundle.layout import Image, Pixels, TexelCheck
 from pipeline.bundle.manifest import Manifest, MapImage
 from pipeline.errors import DamagedError
-from pipeline.optics.scene import Scene
 from pipeline.report import exr, images
 from pipeline.report.exr import Structure
+from pipeline.scene.model import Scene
 
 # zlib shrinks zeros a thousandfold; tables and maps shrink to half, and further where a scene leaves texels out
 _MOST_GROWTH, _GROWS_BELOW = 100, 2**27

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
 from pipeline.validated import Validated
 
 if TYPE_CHECKING:

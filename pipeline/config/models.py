@@ -15,7 +15,8 @@ from pipeline.optics.brdf import Radiometry
 from pipeline.optics.coherence import Coherence
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
-from pipeline.optics.scene import Direction, Lights, Scene
+from pipeline.scene.lights import Direction, Lights
+from pipeline.scene.model import Scene
 from pipeline.surface.source import SurfaceSource
 from pipeline.validated import Exposure, Validated
 
@@ -87,9 +88,12 @@ class Config(Validated):
 
     @model_validator(mode="after")
     def maps_show_the_scene(self) -> Self:
-        """Takes the lights of the scene for maps without lights of their own."""
-        if self.scene is None or "lights" in self.render.model_fields_set:
+        """Takes the lights of a flat sample's scene, or their middles, for maps without lights of their own."""
+        if self.scene is None or self.scene.cameras is not None or "lights" in self.render.model_fields_set:
             return self
+        # a light below the horizon is a fault that is found later
+        above = dict.fromkeys(light.shown for light in self.scene.lights if light.shown[0] < 90.0)
+        shown = [Direction(theta_deg=theta, phi_deg=phi) for theta, phi in above] or self.render.lights
         # the model is frozen, but nobody holds it yet
-        object.__setattr__(self, "render", self.render.model_copy(update={"lights": self.scene.lights}))
+        object.__setattr__(self, "render", self.render.model_copy(update={"lights": shown}))
         return self

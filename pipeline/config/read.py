@@ -5,11 +5,15 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 from pydantic import ValidationError
 
 from pipeline import layouts
 from pipeline.config.models import Config
 from pipeline.errors import ConfigError
+from pipeline.scene import lights
+from pipeline.scene.faults import faults as faults_of_scene
+from pipeline.scene.visited import rho_max
 from pipeline.surface.recipes.parameters import Recipe
 
 _KINDS = tuple(str(get_args(kind.model_fields["kind"].annotation)[0]) for kind in get_args(get_args(Recipe)[0]))
@@ -65,16 +69,28 @@ def parse(document: dict[str, Any], source: str, folder: Path) -> Config:
 
 
 def _scene_faults(config: Config) -> list[tuple[str, str]]:
-    """Finds lights of [render] that are not in [scene]: the table does not cover them."""
+    """Finds faults of [scene], and lights of [render] that are not in it: the table does not cover them."""
     if config.scene is None:
         return []
+    found = [(f"scene.{key}", text) for key, text in faults_of_scene(config.scene)]
+    if found:
+        return found
+    if config.scene.cameras is not None:
+        reach = rho_max(config.scene)
+        widest = np.degrees(np.arcsin(min(1.0, reach)))
+        text = f"expected theta below {widest:.3g}, because the cameras of [scene] see nothing beyond it, got "
+        return [
+            (f"render.lights.{i}", f"{text}{light.theta_deg:g}")
+            for i, light in enumerate(config.render.lights)
+            if np.sin(np.radians(light.theta_deg)) >= reach
+        ]
     return [
         (
             f"render.lights.{i}",
             f"expected a light of [scene], got theta {light.theta_deg:g}, phi {light.phi_deg:g} deg; add it there",
         )
         for i, light in enumerate(config.render.lights)
-        if not any(light.same_as(other) for other in config.scene.lights)
+        if not any(other.holds(light.vector) for other in config.scene.lights)
     ]
 
 
@@ -136,6 +152,6 @@ def _shortened(value: Any) -> str:
 
 
 def _is_union_tag(part: str, loc: tuple[int | str, ...]) -> bool:
-    types = {"float", "str", "int", "LaserLine", *_KINDS, *layouts.LAYOUTS}
+    types = {"float", "str", "int", "LaserLine", *_KINDS, *lights.KINDS, *layouts.LAYOUTS}
     shapes = ("tuple[", "literal[", "constrained-", "function-")
     return loc.index(part) > 0 and (part in types or part.startswith(shapes))

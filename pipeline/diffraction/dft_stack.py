@@ -21,6 +21,7 @@ from pipeline.arrays import Array
 from pipeline.diffraction.device import require_device
 from pipeline.errors import AccuracyError
 from pipeline.fourier import term_transforms
+from pipeline.fourier.lengths import next_fast
 from pipeline.optics.coherence import BLIND_SIGMAS, reach_sigmas, sigma_f
 from pipeline.progress import Progress, silent
 from pipeline.surface.extent import Extent
@@ -233,14 +234,11 @@ def samples_seen(extent: Extent, sigma_um: float, tolerance: float) -> tuple[int
 
     The samples beyond hold less than `tolerance` of the window's sum.
     """
-    from scipy.fft import next_fast_len
-
     (ny, nx), (pitch_x, pitch_y) = extent.shape, extent.pitch_um
     reach_um = min(reach_sigmas(tolerance), BLIND_SIGMAS) * sigma_um
     # lengths that are products of small primes are fast to transform
     keep_y, keep_x = (
-        min(n, next_fast_len(2 * int(np.ceil(reach_um / pitch)) + 2, real=True))
-        for n, pitch in ((ny, pitch_y), (nx, pitch_x))
+        min(n, next_fast(2 * int(np.ceil(reach_um / pitch)) + 2)) for n, pitch in ((ny, pitch_y), (nx, pitch_x))
     )
     return keep_y, keep_x
 

@@ -4,12 +4,13 @@ Heights are scaled to t = h / H in [-1, 1], and the phase is z t with z = k |w| 
 """
 
 from dataclasses import dataclass
-from math import exp, pi
+from math import ceil, exp, pi
 
 import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.errors import AccuracyError
+from pipeline.fourier.lengths import next_fast
 from pipeline.optics.light import Quadrature
 from pipeline.surface.heightfield import HeightField
 
@@ -24,6 +25,8 @@ MIRROR_SHARE = 1e-3
 _ROUNDING_RMS = 0.41
 # above this phase float64 cannot represent the sum either, and the estimate exp(2 z) is enough
 _HOPELESS_PHASE = 40.0
+# samples of waves that are transformed at once for Bessel functions
+_BESSEL_SAMPLES = 2**18
 
 
 def largest_phase(half_range_um: float, lambda_min_nm: float) -> float:
@@ -169,13 +172,27 @@ def _specular_loss(t: Array, share: Array, z_max: float, quadrature: Quadrature)
     return float(np.max(rounded / np.maximum(np.sum(powers, axis=-1), MIRROR_SHARE)))
 
 
+def bessel(orders: int, z: Array) -> Array:
+    """Computes J_n(z) for n = 0 .. orders - 1 and z >= 0 (k,), to the rounding of z. Returns (orders, k).
+
+    J_n are the Fourier coefficients of exp(i z sin t), a smooth and periodic function: a transform of M samples errs
+    by J_(M - n) alone, and J_m(z) < 1e-16 for m = 2 z + 64. scipy.special has them too, but its import takes longer
+    than all that a bake needs of them.
+    """
+    samples = next_fast(orders + 2 * ceil(float(np.max(z, initial=0.0))) + 64)
+    waves = np.sin(2.0 * pi / samples * np.arange(samples))
+    found = np.empty((orders, len(z)))
+    at_once = max(1, _BESSEL_SAMPLES // samples)
+    for first in range(0, len(z), at_once):
+        some = slice(first, first + at_once)
+        found[:, some] = np.fft.fft(np.exp(1j * np.outer(z[some], waves)))[:, :orders].real.T / samples
+    return found
+
+
 def chebyshev_order(z: float, tolerance: float) -> int:
     """Computes the smallest N with 2 sum_(n > N) |J_n(z)| <= `tolerance`, the tail of the Jacobi-Anger expansion.
 
     z: phase, radians. tolerance: error allowed in exp(i z t).
     """
-    from scipy.special import jv
-
-    orders = np.arange(int(z) + 400)
-    tail: Array = 2.0 * np.cumsum(np.abs(jv(orders, z))[::-1])[::-1]
+    tail: Array = 2.0 * np.cumsum(np.abs(bessel(int(z) + 400, np.array([z]))[:, 0])[::-1])[::-1]
     return max(1, int(np.argmax(tail <= tolerance)) - 1)

@@ -172,12 +172,10 @@ def gather(
     Returns E (2 a / 16, n_r, nodes, 16), first the given azimuths, then their opposites. Raises DeviceError if no
     device works.
     """
-    from scipy.special import jv
-
     n = np.arange(built.terms)[:, None]
     # w < 0 makes the argument of the Jacobi-Anger expansion negative, and J_n(-z) = (-1)^n J_n(z)
     phase = s_nodes(nodes, s_max(lambda_min_nm)) * built.half_range_um
-    bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * jv(n, phase)
+    bessel = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n * expansion.bessel(built.terms, phase)
     modes = None
     if places != MIDDLE:
         x, y = dft_stack.modes(built, places)

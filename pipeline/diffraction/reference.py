@@ -9,7 +9,9 @@
 
 import os
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 
 import numpy as np
@@ -38,6 +40,7 @@ _DIRECTIONS_AT_ONCE = 8192
 # a larger stack is made in parts of its terms, while P of some directions takes no more than _AMPLITUDE_BYTES
 _HELD_BYTES, _AMPLITUDE_BYTES = 2**29, 2**28
 _ROWS_AT_ONCE = 32
+_METAL_AT_ONCE = 1024
 
 
 def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: float) -> Array:
@@ -63,8 +66,12 @@ def power_direct(field: HeightField, sigma_um: float, uvw: Array, lambda_nm: flo
         for first in range(0, ny, _ROWS_AT_ONCE):
             rows = slice(first, min(first + _ROWS_AT_ONCE, ny))
             phase = 2.0 * pi / lambda_um * w * heights[rows]
-            # vecdot conjugates its first argument; a matrix product would start competing threads
-            amplitude += np.sum(along_y[rows] * np.vecdot(np.cos(phase) - 1j * np.sin(phase), along_x))
+            # a matrix product would start competing threads, and sums of complex numbers take twice as long
+            (cos_x, cos_y), (sin_x, sin_y) = (
+                (np.vecdot(wave, along_x.real), np.vecdot(wave, along_x.imag))
+                for wave in (np.cos(phase), np.sin(phase))
+            )
+            amplitude += np.sum(along_y[rows] * (cos_x - sin_y + 1j * (cos_y + sin_x)))
         power[i] = np.abs(amplitude / total) ** 2
     power[~in_band(field, uvw, np.array([lambda_um]))[:, 0]] = np.nan
     return power
@@ -103,17 +110,25 @@ def integrate(
     sigma_um: standard deviation of the coherence window, um. wi, wr: unit vectors (directions, 3).
     Returns (directions, 3).
     """
-    if material.fresnel == "conductor":
-        power = power * brdf.metal_reflectance(material, quadrature, geometry.cos_half(wi, wr))
-        factor = brdf.geometry_factor(material, wi, wr)
-    else:
-        factor = brdf.direction_factor(material, quadrature, wi, wr)
     weights = quadrature.weights * brdf.window_area(material, quadrature, sigma_um)[:, None]
+    if material.fresnel != "conductor":
+        return brdf.direction_factor(material, quadrature, wi, wr)[:, None] * _known_sums(power, weights)
+    cos_half, sums = geometry.cos_half(wi, wr), np.empty((len(power), 3))
+    # Fresnel's equations for all directions at once leave the cache: five times slower
+    for first in range(0, len(power), _METAL_AT_ONCE):
+        part = np.s_[first : first + _METAL_AT_ONCE]
+        reflected = power[part] * brdf.metal_reflectance(material, quadrature, cos_half[part])
+        sums[part] = _known_sums(reflected, weights)
+    return brdf.geometry_factor(material, wi, wr)[:, None] * sums
+
+
+def _known_sums(power: Array, weights: Array) -> Array:
+    """Computes `_sums` with 0 for the NaN of frequencies beyond the Nyquist limits."""
     sums = _sums(power, weights)
-    # few directions exceed the Nyquist limits; only their sums are repeated, with 0 for NaN
+    # few directions exceed the limits; only their sums are repeated
     unknown = np.isnan(sums[:, 0])
     sums[unknown] = _sums(np.nan_to_num(power[unknown]), weights)
-    return np.asarray(factor[:, None] * sums)
+    return sums
 
 
 def _sums(power: Array, weights: Array) -> Array:
@@ -193,27 +208,50 @@ class Reference:
 
         step_nm: step of the spectral integral, nm.
         """
-        quadrature = trapezoid(light, step_nm)
-        uvw = geometry.uvw(wi, wr)
-        order, out = windowed_dft.line_order(uvw), np.empty((len(wr), 3))
-        for tile in self._size.tiles(len(wr), len(quadrature.lambda_nm)):
+        return self.xyz_of([(light, material)], wi, wr, step_nm, progress)[0]
+
+    def xyz_of(
+        self,
+        seen: Sequence[tuple[Light, Material]],
+        wi: Array,
+        wr: Array,
+        step_nm: float = STEP_NM,
+        progress: Progress = silent,
+    ) -> list[Array]:
+        """Computes XYZ (directions, 3) for each of several lights and materials: |P|^2 depends on neither.
+
+        seen: lights of the same wavelengths, with a material each. The other parameters are those of `xyz`.
+        """
+        quadratures = [trapezoid(light, step_nm) for light, _ in seen]
+        uvw, lambda_nm = geometry.uvw(wi, wr), quadratures[0].lambda_nm
+        order, out = windowed_dft.line_order(uvw), [np.empty((len(wr), 3)) for _ in seen]
+        for tile in self._size.tiles(len(wr), len(lambda_nm)):
             these = order[tile]
-            power = self.power(uvw[these], quadrature.lambda_nm)
-            out[these] = integrate(power, quadrature, material, self._sigma_um, wi[these], wr[these])
+            power = self.power(uvw[these], lambda_nm)
+            for xyz, quadrature, (_, material) in zip(out, quadratures, seen, strict=True):
+                xyz[these] = integrate(power, quadrature, material, self._sigma_um, wi[these], wr[these])
             progress("reference", tile.stop / len(wr))
         return out
 
     def xyz_and_middle(
-        self, light: Light, material: Material, wi: Array, wr: Array, uvw: Array, lambda_nm: Array
-    ) -> tuple[Array, Array]:
+        self, seen: Sequence[tuple[Light, Material]], wi: Array, wr: Array, uvw: Array, lambda_nm: Array
+    ) -> tuple[list[Array], Array]:
         """Computes XYZ of directions, and |P|^2 of the window in the middle at a few others, from one stack.
 
-        light, material, wi, wr: as in `xyz`, as many directions as fit into memory. uvw, lambda_nm: as in `power`.
+        seen, wi, wr: as in `xyz_of`, as many directions as fit into memory. uvw, lambda_nm: as in `power`.
         """
-        quadrature = trapezoid(light, STEP_NM)
-        many = Query(geometry.uvw(wi, wr), quadrature.lambda_nm, self.places)
+        quadratures = [trapezoid(light, STEP_NM) for light, _ in seen]
+        many = Query(geometry.uvw(wi, wr), quadratures[0].lambda_nm, self.places)
         power, middle = self._answers([many, Query(uvw, lambda_nm, MIDDLE)])
-        return integrate(power, quadrature, material, self._sigma_um, wi, wr), middle
+        both = zip(quadratures, seen, strict=True)
+        return [integrate(power, q, material, self._sigma_um, wi, wr) for q, (_, material) in both], middle
+
+    def direct(self, uvw: Array, lambda_nm: Array) -> Array:
+        """Computes |P|^2 (directions,) by plain sums, each direction at its own wavelength and in its own thread."""
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            one = partial(power_direct, self.field, self._sigma_um)
+            found = pool.map(lambda at, nm: one(at[None], float(nm))[0], uvw, lambda_nm)
+            return np.array(list(found))
 
     def _answers(self, queries: Sequence[Query]) -> list[Array]:
         """Computes |P|^2 (directions, L) for every query."""
@@ -340,7 +378,7 @@ class ReferenceSize:
         terms = self.terms_at_once
         power = windowed_dft.exact_power_bytes(tile, wavelengths, self.stack.reach[0], terms, units, self._modes)
         # four complex arrays of Fresnel's equations, R and its product with |P|^2
-        metal = (4 * 16 + 2 * 8) * tile * wavelengths if material.fresnel == "conductor" else 0
+        metal = (4 * 16 + 2 * 8) * min(tile, _METAL_AT_ONCE) * wavelengths if material.fresnel == "conductor" else 0
         parts = {} if self.is_held else self.stack.chebyshev_bytes(terms, 8)
         return {
             "reference": self.nbytes,

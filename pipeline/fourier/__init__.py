@@ -2,5 +2,5 @@
 
 - `term_transforms.py`: the transforms of a series' terms at the coefficients that are kept, planned by measurement.
 - `wisdom.py`: saves those plans for later processes.
-- `backend.py`: single transforms for statistics and recipes, by `scipy.fft` with FFTW as its backend.
+- `backend.py`: single transforms for recipes, by `scipy.fft` with FFTW as its backend.
 """

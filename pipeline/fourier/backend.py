@@ -22,12 +22,6 @@ Complex = NDArray[np.complex128]
 _LARGE = 2**22
 
 
-def fft(values: Real) -> Complex:
-    """Transforms values (n,) to (n,)."""
-    with _fftw() as transforms:
-        return np.asarray(transforms.fft(values))
-
-
 def rfft2(values: Real, shape: tuple[int, int] | None = None) -> Complex:
     """Transforms real values (ny, nx), padded with zeros to `shape`, to half of a spectrum (ny, nx // 2 + 1)."""
     threads = _threads(values.shape if shape is None else shape)

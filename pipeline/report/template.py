@@ -1,7 +1,11 @@
 """Texts as files: jinja2 templates, in the folder templates/ of a package."""
 
 import base64
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 def markdown(packages: tuple[str, ...], name: str, **values: Any) -> str:
@@ -21,6 +25,12 @@ def html(package: str, name: str, **values: Any) -> str:
 
 
 def _fill(packages: tuple[str, ...], name: str, values: dict[str, Any], *, autoescape: bool) -> str:
+    return _environment(packages, autoescape=autoescape).get_template(name).render(values)
+
+
+@cache
+def _environment(packages: tuple[str, ...], *, autoescape: bool) -> "Environment":
+    """Makes the environment of some packages' templates, which keeps them compiled."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -32,4 +42,4 @@ def _fill(packages: tuple[str, ...], name: str, values: dict[str, Any], *, autoe
         keep_trailing_newline=True,
     )
     environment.filters["base64"] = lambda data: base64.b64encode(data).decode("ascii")
-    return environment.get_template(name).render(values)
+    return environment

@@ -1,6 +1,7 @@
 """Memory and time of every stage before it begins, and the refusal of those that exceed their limits."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from pipeline import layouts, resources
@@ -27,6 +28,9 @@ _WAYS_OUT = (
     WayOut("accuracy.delta_e", 100.0, rises=True),
 )
 _HALVINGS, _PROPOSED = 12, 2
+# measured on snakes: bytes of a pixel of a map, EXR and PNG; of a report without and with each map; the share of a
+# table that EXR leaves
+_PIXEL_BYTES, _REPORT_BYTES, _REPORTED_MAP_BYTES, _COMPRESSED = 10, 500_000, 1_500_000, 0.88
 
 
 def needs(config: Config, made: Mapping[str, Summary], *, reads: bool = False) -> dict[str, Need]:
@@ -35,22 +39,69 @@ def needs(config: Config, made: Mapping[str, Summary], *, reads: bool = False) -
     made: summaries of the stages whose artifacts exist. A plan of rings and azimuths that is not made is foreseen at
     the grid where its search starts. reads: whether a scan that no stage has read is read here.
     """
-    if "surface" in made:
-        return _needs(config, surface.extent_in(made["surface"]), made)
-    if config.surface.recipe is not None:
-        return _needs(config, recipes.extent(config.surface.recipe), made)
-    if not reads:
+    extent = _extent(config, made, reads=reads)
+    if extent is None:
         return {}
-    try:
-        return _needs(config, surface.field_of(config)[0].extent, made)
-    except BakeError:  # the stage that reads the scan will report it
-        return {}
-
-
-def _needs(config: Config, extent: Extent, made: Mapping[str, Summary]) -> dict[str, Need]:
-    layout = layouts.of(config.table)
     foreseen = Foreseen(config, extent, made)
-    sizes = layout.sizes(foreseen)
+    return _needs(foreseen, layouts.of(config.table).sizes(foreseen))
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """A bake before it begins.
+
+    needs: of every stage, by name. written: bytes of every artifact. delta_e: mean CIELAB error of the table; None
+    where nothing is known of it.
+    """
+
+    needs: Mapping[str, Need]
+    written: Mapping[str, int]
+    delta_e: float | None
+
+
+def outcome(config: Config, made: Mapping[str, Summary]) -> Prospect:
+    """Predicts a bake, reading a scan that no stage has read; made: as for `needs`."""
+    extent = _extent(config, made, reads=True)
+    if extent is None:
+        return Prospect({}, {}, None)
+    foreseen = Foreseen(config, extent, made)
+    sizes = layouts.of(config.table).sizes(foreseen)
+    return Prospect(_needs(foreseen, sizes), _written(foreseen, sizes), sizes.delta_e)
+
+
+def _extent(config: Config, made: Mapping[str, Summary], *, reads: bool) -> Extent | None:
+    """Returns samples and heights of the surface; None of a scan that is not read, or cannot be."""
+    if "surface" in made:
+        return surface.extent_in(made["surface"])
+    if config.surface.recipe is not None:
+        return recipes.extent(config.surface.recipe)
+    if not reads:
+        return None
+    try:
+        return surface.field_of(config)[0].extent
+    except BakeError:  # the stage that reads the scan will report it
+        return None
+
+
+def _written(foreseen: Foreseen, sizes: LayoutSizes) -> dict[str, int]:
+    """Estimates the bytes of every artifact."""
+    config, layout = foreseen.config, layouts.of(foreseen.config.table)
+    lights, stored = len(config.render.lights), sizes.stored_bytes // 3
+    maps = lights * config.render.size**2 * _PIXEL_BYTES
+    report = _REPORT_BYTES + lights * _REPORTED_MAP_BYTES
+    return {
+        "surface": foreseen.extent.bytes,
+        layout.transform.name: sizes.written_bytes,
+        layout.table.name: sizes.table_bytes,
+        layout.textures.name: stored,
+        "render": maps,
+        "validate": report,
+        "bundle": round(_COMPRESSED * (stored or sizes.table_bytes)) + maps + report,
+    }
+
+
+def _needs(foreseen: Foreseen, sizes: LayoutSizes) -> dict[str, Need]:
+    config, extent, layout = foreseen.config, foreseen.extent, layouts.of(foreseen.config.table)
     return {
         "surface": surface.need(config.surface, extent, config.light.lambda_min_nm),
         layout.transform.name: sizes.transform,

@@ -74,9 +74,11 @@ class Foreseen:
 class LayoutSizes:
     """Memory and time that the stages of a layout need.
 
-    transform, table: of these stages. transform_bytes: of the transform, if the session holds it.
+    transform, table: of these stages. transform_bytes: of the transform, if the session holds it. written_bytes: of
+    the transform as an artifact.
     table_bytes: of the table. freed_bytes: of arrays of both stages that the device's pool may keep.
     textures: of this stage, in addition to the table. stored_bytes: of the textures, 0 where they are the table.
+    delta_e: mean CIELAB error expected of the table; None where nothing is known of it.
     study: of the curves of `validate`, in addition to the table. prepared: of a bundle's images, likewise.
     """
 
@@ -89,6 +91,8 @@ class LayoutSizes:
     stored_bytes: int
     study: Need
     prepared: Need
+    written_bytes: int = 0
+    delta_e: float | None = None
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ class Layout:
     load: reads the table of an artifact. table_of: returns the table of a stage's inputs, from memory if it is there.
     stored_of: returns the table that the bundle's textures hold.
     study: returns the curves of error against each setting that `validate` shows, from config, inputs, the table's
-        evaluator and the map on which errors are measured. study_remark: a sentence on them for the report.
+        evaluator and the map on which errors are measured. studied: returns the config with the light and the
+        material under which they are measured. study_remark: a sentence on them for the report.
     sizes: computes memory and time of the layout's stages before they begin.
     ways_out: keys of [table] that a refusal of too much work may propose to change.
     settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
@@ -46,6 +47,7 @@ class Layout:
     table_of: Callable[[Inputs], Table]
     stored_of: Callable[[Inputs], Table]
     study: Callable[[Config, Inputs, Evaluator, CoarseMap], Study]
+    studied: Callable[[Config], Config]
     study_remark: str
     sizes: Callable[[Foreseen], LayoutSizes]
     ways_out: tuple[WayOut, ...]

@@ -8,12 +8,12 @@ import numpy as np
 from pipeline import layouts
 from pipeline.arrays import Array
 from pipeline.config.models import Config
-from pipeline.optics import geometry
 from pipeline.optics.colour import clipped, pixels
-from pipeline.optics.scene import Direction
 from pipeline.progress import Progress
 from pipeline.report import images
 from pipeline.resources import Need, largest
+from pipeline.scene.lights import Direction
+from pipeline.scene.visited import rho_max
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.tables.evaluate import Map, interpolator, look_up_bytes, map_bytes, never_negative, render_map
@@ -29,7 +29,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 def light_direction(light: Direction) -> Array:
     """Computes the unit vector (3,) towards a light, away from the surface."""
-    return geometry.direction(np.radians(light.theta_deg), np.radians(light.phi_deg))
+    return light.vector
 
 
 def map_name(light: Direction) -> str:
@@ -37,16 +37,24 @@ def map_name(light: Direction) -> str:
     return f"map_theta{light.theta_deg:.12g}_phi{light.phi_deg:.12g}"
 
 
-def map_radius(config: Config) -> float:
-    """Computes the radius of a map, sin(theta) of its outermost views: the scene's theta_max, else 1."""
-    return 1.0 if config.scene is None else float(np.sin(np.radians(config.scene.views.theta_max_deg)))
+def map_radius(config: Config, light: Direction) -> float:
+    """Computes the radius of a light's map, sin(theta) of its outermost views: as far as the table reaches.
+
+    That is the scene's theta_max on a flat sample, and what its largest |(u, v)| leaves where cameras see it.
+    """
+    if config.scene is None:
+        return 1.0
+    if config.scene.cameras is None:
+        return float(np.sin(np.radians(config.scene.views.theta_max_deg)))
+    return float(min(1.0, rho_max(config.scene) - np.sin(np.radians(light.theta_deg))))
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     interpolate = interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry)
-    views, unit = Map(config.render.size, map_radius(config)), config.radiometry.unit
+    unit = config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):
+        views = Map(config.render.size, map_radius(config, light))
         interpolated = render_map(interpolate, light_direction(light), views)
         image = never_negative(interpolated)
         stem = map_name(light)

@@ -3,17 +3,16 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from threading import Thread
 from typing import Any
 
 from kernels.device import default_device
-from pipeline import layouts
+from pipeline import layouts, resources
 from pipeline.config.models import Config
 from pipeline.diffraction.device import require_device
 from pipeline.progress import Progress, silent
 from pipeline.resources import Need
-from pipeline.stages import bundle, forecast, provenance, validate
+from pipeline.stages import bundle, cost, forecast, provenance, validate
 from pipeline.stages.render import RENDER
 from pipeline.stages.session import Session
 from pipeline.stages.stage import Inputs, Stage, Summary
@@ -48,11 +47,18 @@ class Step:
 
 @dataclass(frozen=True)
 class Explanation:
-    """The reason why a step is cached or to do, and its cost, as texts; and what it needs, None where unknown."""
+    """The reason why a step is cached or to do, and its work, as texts; and predictions, None where unknown.
+
+    need: its memory. seconds, bytes: predicted time, s, and size of its artifact. delta_e: mean CIELAB error that is
+    expected of the table, in the step that makes it.
+    """
 
     reason: str
-    cost: str
+    work: str
     need: Need | None
+    seconds: float | None
+    bytes: int | None
+    delta_e: float | None
 
 
 def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
@@ -68,22 +74,28 @@ def plan(config: Config, store: Store, until: str = "bundle") -> list[Step]:
 
 
 def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation]:
-    """Explains each step of a plan: why it is cached or to do, its cost and its memory.
+    """Explains each step of a plan: why it is cached or to do, and its time, memory, bytes and error.
 
-    Reads the records of the whole store, and a scan that no stage has read.
+    Reads the records of the whole store, and a scan that no stage has read. Measures the pace of this machine where
+    the store does not know it.
 
     config: the config of the plan. steps: the plan.
     Returns one explanation per step.
     """
     earlier = store.artifacts()
     made = {step.stage.name for step in steps if not step.cached}
-    needs = forecast.needs(config, summaries(steps, store), reads=True)
+    foreseen, machine = forecast.outcome(config, summaries(steps, store)), cost.machine(store)
     explanations = []
     for step in steps:
-        last = _latest(earlier, step.stage.name, config.name)
-        reason = UNCHANGED if step.cached else _reason(step.stage, config, made, last)
-        need = needs.get(step.stage.name)
-        explanations.append(Explanation(reason, _cost(step.stage, config, last, need), need))
+        name = step.stage.name
+        reason = UNCHANGED
+        if not step.cached:
+            reason = _reason(step.stage, config, made, _latest(earlier, name, config.name))
+        need = foreseen.needs.get(name)
+        seconds = None if need is None else machine.seconds(name, need)
+        error = foreseen.delta_e if name == "table" else None
+        work = step.stage.work(config)
+        explanations.append(Explanation(reason, work, need, seconds, foreseen.written.get(name), error))
     return explanations
 
 
@@ -118,18 +130,14 @@ def execute(
     none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
-    uses_device = any(step.stage.uses_device and not step.cached for step in steps)
-    if uses_device:
-        # a missing device is reported before any work; its driver loads while zarr is imported, which takes as long
-        found = _Device()
-        found.start()
-        import_module("zarr")
-        found.result()
+    device = _Device() if any(step.stage.uses_device and not step.cached for step in steps) else None
+    if device is not None:
+        device.start()
     opened: dict[str, Artifact] = {}
     shared = session or Session()
     for step in steps:
         name, seconds = step.stage.name, None
-        require_memory(config, steps, store, default_device().largest_bytes if uses_device else None)
+        require_memory(config, steps, store, device.largest_bytes() if device and step.stage.uses_device else None)
         if store.has(name, step.key):
             store.touch(name, step.key)
         else:
@@ -140,7 +148,7 @@ def execute(
                     for needed in set(step.stage.inputs) - set(opened):
                         opened[needed] = store.open(needed, keys[needed])
                     artifacts = {needed: opened[needed] for needed in step.stage.inputs}
-                    _make(config, step, Inputs(artifacts, shared, step.key), store, progress)
+                    _make(config, step, Inputs(artifacts, shared, step.key), store, progress, device)
                     # its files were hashed when they were written, so they need no check
                     opened[name] = store.describe(name, step.key)
                     seconds = time.perf_counter() - started
@@ -150,7 +158,10 @@ def execute(
 
 
 class _Device(Thread):
-    """Looks for a device. No program waits for it to end: an interrupted import may keep it waiting for ever."""
+    """Looks for a device while the first stage works, whose artifact is not kept where none is found.
+
+    No program waits for it to end: an interrupted import may keep it waiting for ever.
+    """
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -162,11 +173,26 @@ class _Device(Thread):
         except Exception as error:
             self._fault = error
 
-    def result(self) -> None:
+    def require(self) -> None:
         """Waits for the search and raises its error."""
         self.join()
         if self._fault is not None:
             raise self._fault
+
+    def largest_bytes(self) -> int:
+        """Waits for the search; returns how many bytes the device holds in one array, or raises its error."""
+        self.require()
+        return default_device().largest_bytes
+
+    def heeded(self, progress: Progress) -> Progress:
+        """Returns a function that reports progress, and raises the search's error as soon as it is known."""
+
+        def report(step: str, done: float) -> None:
+            if not self.is_alive():
+                self.require()
+            progress(step, done)
+
+        return report
 
 
 def require_memory(config: Config, steps: list[Step], store: Store, largest_buffer: int | None = None) -> None:
@@ -182,13 +208,23 @@ def require_memory(config: Config, steps: list[Step], store: Store, largest_buff
         forecast.require_memory(config, summaries(steps, store), to_do, largest_buffer)
 
 
+def fits(config: Config, steps: list[Step], store: Store, held_bytes: int) -> bool:
+    """Says whether every step that is to do fits into memory beside objects of `held_bytes`, as far as is known."""
+    needs, most = forecast.needs(config, summaries(steps, store)), resources.limit().bytes
+    to_do = [needs[step.stage.name] for step in steps if not step.cached and step.stage.name in needs]
+    return all(need.bytes + held_bytes <= most for need in to_do)
+
+
 def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:
     """Returns the summaries of those steps of a plan whose artifacts are in the store, by stage."""
     made = [step for step in steps if store.has(step.stage.name, step.key)]
     return {step.stage.name: store.describe(step.stage.name, step.key).summary for step in made}
 
 
-def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress) -> None:
+def _make(
+    config: Config, step: Step, inputs: Inputs, store: Store, progress: Progress, device: _Device | None
+) -> None:
+    """Makes the artifact of a step. device: the search for one, where a step of the run needs it."""
     stage = step.stage
     record: dict[str, Any] = {
         "name": config.name,
@@ -198,7 +234,9 @@ def _make(config: Config, step: Step, inputs: Inputs, store: Store, progress: Pr
     }
     with store.create(stage.name, step.key, record) as (folder, whole):
         started = time.perf_counter()
-        whole["summary"] = stage.produce(config, inputs, folder, progress)
+        whole["summary"] = stage.produce(config, inputs, folder, device.heeded(progress) if device else progress)
+        if device:
+            device.require()
         whole["provenance"] = {
             **provenance.versions(),
             **(provenance.device() if stage.uses_device else {}),
@@ -236,14 +274,3 @@ def _changes(before: Any, now: Any, path: str = "") -> list[str]:
         return []
     values = f" {before} -> {now}"
     return [path + (values if len(values) < 40 else "")]
-
-
-def _cost(stage: Stage, config: Config, last: Artifact | None, need: Need | None) -> str:
-    """Describes the work of a stage, and the time that it took last, in s, or an estimate of it."""
-    parts = [text for text in [stage.work(config)] if text]
-    seconds = None if last is None else last.record.get("provenance", {}).get("seconds")
-    if seconds is not None:
-        parts.append(f"{seconds:.1f} s last time")
-    elif need is not None:
-        parts.append(f"about {max(need.seconds, 0.1):.1g} s")
-    return ", ".join(parts) or "unknown before it has run once"

@@ -105,8 +105,14 @@ def colour_parameters(config: Config) -> dict[str, Any]:
 
 
 def scene_parameters(config: Config) -> dict[str, Any] | None:
-    """Returns the section [scene] as part of an address, None where there is none."""
-    return None if config.scene is None else config.scene.model_dump(mode="json")
+    """Returns the section [scene] as part of an address, with the digests of its files; None where there is none."""
+    if config.scene is None:
+        return None
+    section = config.scene.model_dump(mode="json")
+    for entry in (*section["lights"], section["mesh"] or {}):
+        if "path" in entry:
+            entry["path"] = {"sha256": digest.of_file(Path(entry["path"]))}
+    return section
 
 
 def light_parameters(config: Config) -> dict[str, Any]:

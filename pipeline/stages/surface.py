@@ -46,7 +46,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     }
 
 
-def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) -> Summary:
+def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     progress("surface", 0.0)
     field, cleaning, scan = field_of(config)
     lambda_min = config.light.lambda_min_nm
@@ -61,6 +61,7 @@ def _produce(config: Config, _inputs: Inputs, folder: Path, progress: Progress) 
         },
         {"pitch_um": list(field.pitch_um), "convention": "y up with the row index"},
     )
+    inputs.keep(field)
     progress("surface", 1.0)
     return {
         "scan": scan,
@@ -167,11 +168,12 @@ def of(inputs: Inputs) -> HeightField:
 
 
 def reference_of(config: Config, inputs: Inputs, progress: Progress) -> Reference:
-    """Returns the exact reference of the height field, which the stages table, validate and bundle share."""
-    # it has no artifact, so that a session drops it before the next config, whose first stages are not predicted to
-    # hold it
-    address = f"reference of {inputs['surface'].key}"
-    return inputs.session.get(address, lambda: exact.reference_of(of(inputs), config, progress))
+    """Returns the exact reference of the height field, which stages share, and configs that differ in light only."""
+    session = inputs.session
+    name = f"reference of {inputs['surface'].key}"
+    reference = session.derived(name, lambda: exact.reference_of(of(inputs), config, progress))
+    reference.following = [(one.light, one.material) for one in session.following]
+    return reference
 
 
 def load(artifact: Artifact) -> HeightField:
@@ -181,4 +183,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 8, (), _parameters, _produce)
+SURFACE = Stage("surface", 9, (), _parameters, _produce)

@@ -2,6 +2,7 @@
 
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import asdict
+from functools import partial
 from importlib import import_module
 from math import pi
 from pathlib import Path
@@ -10,15 +11,20 @@ from typing import Any
 from pipeline import layouts
 from pipeline.accuracy import checks, convergence
 from pipeline.config.models import Config
+from pipeline.diffraction.reference import Reference
 from pipeline.progress import Progress
 from pipeline.resources import Need, largest
 from pipeline.stages import render, surface
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.layout import Layout
+from pipeline.stages.session import Small
 from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest
-from pipeline.tables.evaluate import table_evaluator
+from pipeline.store import digest
+from pipeline.tables.evaluate import Evaluator, table_evaluator
 
 REPORT = "report.html"
+# of one reflectance, s
+_METAL_S = 7e-8
 
 
 def _parameters(config: Config) -> dict[str, Any]:
@@ -48,26 +54,27 @@ def _measured(
 ) -> tuple[Summary, dict[str, Future[bytes]]]:
     """Computes the numbers of the summary; returns them and the pictures by name, drawn by the executor."""
     field, layout = surface.of(inputs), layouts.of(config.table)
-    drawn = {"surface": drawing.submit(_picture, "height_map", field)}
+    drawn = {"surface": drawing.submit(_once, inputs, f"plot of {inputs['surface'].key}", "height_map", field)}
     # errors are those of the textures that a bundle holds; settings are varied of the table that they are made of
     evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
     reference = surface.reference_of(config, inputs, progress)
-    radius, exposures = render.map_radius(config), (config.render.exposure_ru, config.accuracy.exposure_ru)
-    first = render.light_direction(config.render.lights[0])
-    study = layout.study(config, inputs, baked, convergence.CoarseMap(reference, config, first, radius))
-    curves = _curves(study, progress)
-    drawn["convergence"] = drawing.submit(_picture, "convergence", curves, exposures[1])
+    exposures = (config.render.exposure_ru, config.accuracy.exposure_ru)
+    radii = [render.map_radius(config, light) for light in config.render.lights]
+    studied, compute = _name_of_curves(layout, config, inputs), partial(_curves, layout, config, inputs, baked)
+    curves = inputs.session.derived(studied, lambda: compute(reference, progress)).value
+    drawn["convergence"] = drawing.submit(_once, inputs, f"plot of {studied}", "convergence", curves, exposures[1])
     maps: list[dict[str, Any]] = []
-    for light in config.render.lights:
+    for light, radius in zip(config.render.lights, radii, strict=True):
         towards, named = render.light_direction(light), f"light {light.theta_deg:g}°, {light.phi_deg:g}°"
         check = checks.check_map(evaluate, reference, config, towards, radius, progress)
         picture = drawing.submit(_picture, "map_comparison", check, *exposures, named)
         drawn[f"comparison_{render.map_name(light)}"] = picture
         errors = {key: [asdict(error) for error in getattr(check, key)] for key in ("colour", "largest")}
         maps.append({**light.model_dump(), **errors})
+    certificate = inputs.summary("textures")["certificate"]
     results: Summary = {
-        # both were measured for the certificate
-        **{name: inputs.summary("textures")["certificate"][name] for name in ("reference", "random", "flank")},
+        # these were measured for the certificate
+        **{name: certificate[name] for name in ("reference", "random", "flank", "border")},
         "maps": maps,
         "convergence": [asdict(curve) for curve in curves],
         "budget": _budget(config, maps),
@@ -81,12 +88,33 @@ def _picture(of: str, *arguments: Any) -> bytes:
     return png
 
 
-def _curves(study: convergence.Study, progress: Progress) -> list[convergence.Curve]:
-    curves = []
+def _once(inputs: Inputs, name: str, of: str, *arguments: Any) -> bytes:
+    """Draws a plot that other configs of this run share."""
+    return inputs.session.derived(name, lambda: Small(_picture(of, *arguments))).value
+
+
+def _name_of_curves(layout: Layout, config: Config, inputs: Inputs) -> str:
+    """Names the curves after all that they depend on."""
+    studied = layout.studied(config)
+    of = {**colour_parameters(studied), "light": config.render.lights[0].model_dump()}
+    # curves of a table that is itself made for a light or a material are those of this table alone
+    table = layout.transform.name if studied != config else "table"
+    return f"curves of {inputs[table].key} {digest.of_json(of)}"
+
+
+def _curves(
+    layout: Layout, config: Config, inputs: Inputs, baked: Evaluator, reference: Reference, progress: Progress
+) -> Small[list[convergence.Curve]]:
+    """Computes the error against each setting of the table, on a coarse map under the first light."""
+    studied, first = layout.studied(config), config.render.lights[0]
+    coarse = convergence.CoarseMap(
+        reference, studied, render.light_direction(first), render.map_radius(config, first)
+    )
+    study, curves = layout.study(studied, inputs, baked, coarse), []
     for i, setting in enumerate(study):
         curves.append(setting())
         progress("convergence", (i + 1) / len(study))
-    return curves
+    return Small(curves)
 
 
 def _budget(config: Config, maps: list[dict[str, Any]]) -> dict[str, Any]:
@@ -119,7 +147,9 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     )
     # the rows of a map share sums over columns
     shared = (2 * reference.stack.reach[1] + 1) / 2
-    seconds = sizes.study.seconds + (lights + 0.05) * reference.seconds(views, wavelengths) / shared
+    # Fresnel's equations of a metal at every view and wavelength
+    metal = _METAL_S * views * wavelengths if config.material.fresnel == "conductor" else 0.0
+    seconds = sizes.study.seconds + (lights + 0.05) * (reference.seconds(views, wavelengths) / shared + metal)
     return Need({**base("validate"), **kept, **foreseen.held(), **arrays}, seconds, sizes.study.buffer)
 
 
@@ -130,4 +160,4 @@ def _work(config: Config) -> str:
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render")
-    return Stage("validate", 8, inputs, _parameters, _produce, uses_device=True, work=_work)
+    return Stage("validate", 9, inputs, _parameters, _produce, uses_device=True, work=_work)

@@ -30,6 +30,8 @@ def error_rows(results: dict[str, Any]) -> Rows:
     if (flank := results["flank"]) is not None:
         name = f"within {flank['lobe_widths']:g} widths of mirrors"
         sets.append((name, flank["colour"], _place(flank["largest"])))
+    if results["border"] is not None:
+        sets += [("border of the scene", e, "") for e in results["border"]["colour"]]
     return [
         [name, f"{e['exposure_ru']:g}", *(f"{e[key]:.3f}" for key in ("mean", "percentile_99", "maximum")), place]
         for name, e, place in sets

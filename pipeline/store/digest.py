@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,9 @@ def of_file(path: Path) -> str:
 def of_folder(folder: Path) -> dict[str, dict[str, Any]]:
     """Computes the size ("bytes") and the SHA-256 of every file below a folder, by relative path with slashes."""
     found = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {
-        path.relative_to(folder).as_posix(): {"bytes": path.stat().st_size, "sha256": of_file(path)} for path in found
-    }
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        digests = pool.map(of_file, found)
+        return {
+            path.relative_to(folder).as_posix(): {"bytes": path.stat().st_size, "sha256": sha256}
+            for path, sha256 in zip(found, digests, strict=True)
+        }

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Array
+from pipeline.arrays import Array, on_a_cache_line
 from pipeline.errors import InputError
 from pipeline.surface.fill import fill_holes
 from pipeline.surface.heightfield import HeightField
@@ -74,7 +74,8 @@ def condition(
     if holes:
         heights = fill_holes(heights, valid, field.pitch_um)
     centre = 0.5 * (float(heights.max()) + float(heights.min()))
-    return HeightField(heights - centre, field.pitch_um), replace(record, centre_um=centre)
+    centred = np.subtract(heights, centre, out=on_a_cache_line(heights.shape, np.float64))
+    return HeightField(centred, field.pitch_um), replace(record, centre_um=centre)
 
 
 # --- levelling ---------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Array
-from pipeline.fourier import backend as fourier
+from pipeline.fourier.lengths import next_fast
 from pipeline.surface.heightfield import HeightField
 
 # fewer repeats across the patch cannot be distinguished from waviness
@@ -194,8 +194,6 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
 
     Each octave of |f| is smoothed by a kernel of its own width. Octaves overlap, so that no maximum lies between two.
     """
-    from scipy import ndimage
-
     bin_area = spectrum.bin_per_um[0] * spectrum.bin_per_um[1]
     lowest = _FEWEST_REPEATS * min(spectrum.bin_per_um)
     highest = float(np.hypot(np.max(np.abs(spectrum.fx), initial=0.0), np.max(np.abs(spectrum.fy), initial=0.0)))
@@ -210,21 +208,33 @@ def _candidates(spectrum: _HeightSpectrum, highest_per_um: float) -> list[comple
         )
         before, near = near, _cut(spectrum, reach_x, reach_y)
         if before is None or before.power.shape != near.power.shape:
-            transform = fourier.rfft2(near.power, _fast(near.power.shape))
-        fx, fy = near.fx, near.fy[:, None]
+            transform = np.fft.rfft2(near.power, _fast(near.power.shape))
+        density = _smooth(near, transform, width_x, width_y)
+        # all power of a lobe narrower than the kernel, and a part of a wider one's: hence the lower threshold
+        power_of_density = 2 * 2 * pi * width_x * width_y / bin_area
+        bright = np.argwhere(density > 0.25 * _LEAST_SHARE * spectrum.variance / power_of_density)
+        fx, fy = near.fx[bright[:, 1]], near.fy[bright[:, 0]]
         radius = np.hypot(fx, fy)
         repeats = np.hypot(fx / spectrum.bin_per_um[0], fy / spectrum.bin_per_um[1])
-        peaks = (repeats >= _FEWEST_REPEATS) & (radius <= highest_per_um) & ((fx > 0) | ((fx == 0) & (fy > 0)))
-        density = _smooth(near, transform, width_x, width_y)
-        peaks &= (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
-        peaks &= density == ndimage.maximum_filter(density, 3)
-        # all power of a lobe narrower than the kernel, and a part of a wider one's: hence the lower threshold
-        power = density * (2 * 2 * pi * width_x * width_y / bin_area)
-        peaks &= power > 0.25 * _LEAST_SHARE * spectrum.variance
-        candidates += [(float(power[j, i]), complex(fx[i], fy[j, 0])) for j, i in np.argwhere(peaks)]
+        wanted = (repeats >= _FEWEST_REPEATS) & (radius <= highest_per_um) & ((fx > 0) | ((fx == 0) & (fy > 0)))
+        wanted &= (radius >= 0.8 * lowest) & (radius <= 2.5 * lowest)
+        peaks = bright[wanted][_is_maximum(density, bright[wanted])]
+        candidates += [(float(density[j, i] * power_of_density), complex(near.fx[i], near.fy[j])) for j, i in peaks]
         lowest *= 2
     candidates.sort(key=lambda entry: -entry[0])
     return [frequency for _, frequency in candidates]
+
+
+def _is_maximum(density: Array, places: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether no neighbour of a place is brighter, (n,); places: rows and columns (n, 2)."""
+    (rows, columns), (last_row, last_column) = places.T, (n - 1 for n in density.shape)
+    here = density[rows, columns]
+    is_highest = np.ones(len(places), bool)
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            beside = np.clip(rows + down, 0, last_row), np.clip(columns + right, 0, last_column)
+            is_highest &= here >= density[beside]
+    return is_highest
 
 
 def _cut(spectrum: _HeightSpectrum, reach_x: float, reach_y: float) -> _HeightSpectrum:
@@ -243,14 +253,14 @@ def _smooth(spectrum: _HeightSpectrum, transform: NDArray[np.complex128], width_
     gain_x = np.exp(-2 * (pi * width_x / spectrum.bin_per_um[0] * np.fft.rfftfreq(mx)) ** 2)
     gain_y = np.exp(-2 * (pi * width_y / spectrum.bin_per_um[1] * np.fft.fftfreq(my)) ** 2)
     rows, columns = spectrum.power.shape
-    return fourier.irfft2(transform * gain_y[:, None] * gain_x, (my, mx))[:rows, :columns]
+    smoothed = transform * gain_y[:, None]
+    smoothed *= gain_x
+    return np.fft.irfft2(smoothed, (my, mx))[:rows, :columns]
 
 
 def _fast(shape: tuple[int, ...]) -> tuple[int, int]:
     """Returns the next sizes with fast transforms."""
-    from scipy.fft import next_fast_len
-
-    my, mx = (next_fast_len(n, real=True) for n in shape)
+    my, mx = (next_fast(n) for n in shape)
     return my, mx
 
 

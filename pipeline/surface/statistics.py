@@ -6,7 +6,6 @@ from math import asin, pi, sqrt
 import numpy as np
 
 from pipeline.arrays import Array
-from pipeline.fourier import backend as fourier
 from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.periods import Period, dominant_periods
@@ -80,10 +79,10 @@ def measuring_bytes(extent: Extent, lambda_min_nm: float) -> int:
     """Computes the memory in which `measure` works, bytes.
 
     The square deviations of `np.std`, or, in `periods`, the half of the transform along x that views can reach and
-    nine arrays of the frequencies that they can reach.
+    eight arrays of the frequencies that they can reach.
     """
     share_x, share_y = (min(1.0, 2.0 * pitch * 2e3 / lambda_min_nm) for pitch in extent.pitch_um)
-    return 8 * round(extent.samples * max(1.0, share_x + 9 * share_x * share_y))
+    return 8 * round(extent.samples * max(1.0, share_x + 8 * share_x * share_y))
 
 
 def _seam_energy(heights: Array) -> float:
@@ -99,7 +98,7 @@ def _seam_energy(heights: Array) -> float:
     twice = np.full(nx // 2 + 1, 2.0)
     twice[[0, *([-1] if nx % 2 == 0 else [])]] = 1.0
     # the sources lie in two rows and two columns, so that one-dimensional transforms suffice
-    across, along = fourier.fft(heights[-1] - heights[0])[: nx // 2 + 1], fourier.fft(heights[:, -1] - heights[:, 0])
+    across, along = np.fft.rfft(heights[-1] - heights[0]), np.fft.fft(heights[:, -1] - heights[:, 0])
     step_x, step_y = 1.0 - np.exp(1j * turn_x), 1.0 - np.exp(1j * turn_y)
     smooth = 0.0
     for first in range(0, ny, _ROWS_AT_ONCE):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.accuracy.checks import check_flank
+from pipeline.accuracy.checks import check_border, check_flank
 from pipeline.errors import AccuracyError
 from pipeline.stages.polar import certificate
 from pipeline.tables.evaluate import table_evaluator
@@ -41,6 +41,17 @@ def test_a_planned_table_keeps_the_flank_of_the_specular_lobe() -> None:
 def test_lights_whose_mirror_direction_is_not_seen_have_no_flank() -> None:
     found = config(scene={"lights": [{"theta_deg": 60}], "views": {"theta_max_deg": 20}})
     assert check_flank(exact_of(found).xyz, exact_of(found), found) is None
+
+
+def test_a_scene_has_a_border_where_a_table_errs_more_and_which_is_measured_apart() -> None:
+    """The spline is mirrored at the last ring, at the largest |(u, v)| of a scene: 0.20 there, 0.06 on all."""
+    found = config(scene={"lights": [{"kind": "sun", "theta_deg": 30}], "views": {"theta_max_deg": 40}})
+    table, _ = planned(found)
+    border = check_border(table_evaluator(table, found.radiometry), exact_of(found), found)
+    assert border is not None
+    assert border.directions == 400
+    assert next(error.mean for error in border.colour if error.exposure_ru == 7500.0) <= 0.3
+    assert check_border(table_evaluator(table, found.radiometry), exact_of(found), config()) is None
 
 
 def test_a_table_that_misses_its_budget_is_refused() -> None:

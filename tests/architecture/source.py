@@ -16,6 +16,7 @@ HEAVY = {
     "pyopencl",
     "scipy",
     "SurfaceTopography",
+    "trimesh",
     "zarr",
 }
 

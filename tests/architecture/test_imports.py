@@ -8,7 +8,7 @@ import pytest
 
 from .source import HEAVY, PACKAGES, ROOT, anywhere, imported, relative, sources, tree, within
 
-STAGE_FREE = ("tables", "fourier", "diffraction", "accuracy", "optics", "surface")
+STAGE_FREE = ("tables", "scene", "fourier", "diffraction", "accuracy", "optics", "surface")
 
 
 def is_script(statement):
@@ -64,13 +64,13 @@ def test_physics_knows_no_stages():
 
 def test_physics_and_kernels_know_no_store():
     """Closed forms, sums, tables and kernels neither read nor address artifacts."""
-    places = ["pipeline/optics", "pipeline/diffraction", "pipeline/tables", "kernels"]
+    places = ["pipeline/optics", "pipeline/scene", "pipeline/diffraction", "pipeline/tables", "kernels"]
     assert offenders(places, "pipeline.store") == {}
 
 
 def test_physics_knows_no_config():
     """Closed forms, transforms and tables take values; only stages and what is above them open a config."""
-    rooms = ("optics", "surface", "fourier", "diffraction", "tables")
+    rooms = ("optics", "scene", "surface", "fourier", "diffraction", "tables")
     assert offenders([f"pipeline/{room}" for room in rooms], "pipeline.config") == {}
 
 

@@ -19,7 +19,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.optics import brdf, geometry
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.tables.evaluate import interpolator, table_evaluator
 from pipeline.tables.polar.compression import whole
 from pipeline.tables.polar.table import PolarTable

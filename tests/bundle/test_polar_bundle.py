@@ -18,9 +18,9 @@ from pipeline.bundle.verify import open_bundle, verify
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError, ConfigError
 from pipeline.optics.colour import ColourError, delta_e
-from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import silent
 from pipeline.report import images
+from pipeline.scene.pairs import random_pairs
 from pipeline.stages import run, surface
 from pipeline.stages.polar import table as polar_table
 from pipeline.stages.stage import Inputs

@@ -12,7 +12,7 @@ from pipeline.bundle.taylor.layout import TaylorLoss
 from pipeline.bundle.verify import open_bundle, verify
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import delta_e
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.stages.taylor import table as taylor_table
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor.table import TaylorTable

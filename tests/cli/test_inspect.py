@@ -1,6 +1,7 @@
 """`inspect`: scans, configs and bundles; what a config still needs."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -133,3 +134,22 @@ def test_the_formats_are_listed(tool: Tool) -> None:
     keys = [entry["key"] for entry in tool("inspect", "--formats", "--json").json]
     assert len(keys) == len(listed.stdout.splitlines())
     assert tool("inspect", SCAN, "--formats").code == 2
+
+
+def test_what_a_scene_visits_is_drawn_and_counted(tool: Tool) -> None:
+    """A cone of views about one light visits the disc of its radius about -wi."""
+    config = tool.config(scene={"lights": [{"theta_deg": 30}], "views": {"theta_max_deg": 40}})
+    picture = tool.folder / "scene.png"
+    result = tool("inspect", config, "--picture", picture, "--json")
+    visited = json.loads(result.stdout)["visited"]
+    assert result.code == 0
+    assert visited["rho_max"] == pytest.approx(0.5 + math.sin(math.radians(40)))
+    assert visited["disc_share"] == pytest.approx((math.sin(math.radians(40)) / 2) ** 2, rel=0.15)
+    assert math.cos(math.radians(30)) + math.cos(math.radians(40)) == pytest.approx(visited["w"][0], abs=0.01)
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_picture_needs_a_scene(tool: Tool) -> None:
+    result = tool("inspect", tool.config(), "--picture", tool.folder / "scene.png")
+    assert result.code == 2
+    assert "has none" in result.stderr

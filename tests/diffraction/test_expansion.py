@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import jv
 
-from pipeline.diffraction.expansion import chebyshev_order, float32_rounding, largest_phase, plan_taylor
+from pipeline.diffraction.expansion import bessel, chebyshev_order, float32_rounding, largest_phase, plan_taylor
 from pipeline.errors import AccuracyError
 from pipeline.optics.light import LaserLine, Light, trapezoid
 from pipeline.surface.heightfield import HeightField
@@ -126,6 +126,14 @@ def chebyshev_error(z, order):
     coefficients = (2.0 - (n == 0)) * 1j**n * jv(n, z)
     chebyshev = np.cos(n * np.arccos(T)[:, None])
     return np.max(np.abs(chebyshev @ coefficients - np.exp(1j * z * T)))
+
+
+@given(z=st.lists(st.floats(0.0, 2000.0), max_size=4), orders=st.integers(1, 300))
+def test_bessel_functions_are_scipys(z, orders):
+    """To the rounding of the phase z sin t."""
+    found = bessel(orders, np.array(z))
+    expected = jv(np.arange(orders)[:, None], np.array(z))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15 + 3e-16 * max(z, default=0.0))
 
 
 @settings(max_examples=80, deadline=None)

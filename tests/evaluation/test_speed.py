@@ -18,7 +18,7 @@ from pipeline.evaluation.speed import checks, growth, machine, memory, nufft, po
 from pipeline.evaluation.speed.growth import GrowthCurve, Reading, ScanCost
 from pipeline.evaluation.speed.machine import Machine, Timed, Work
 from pipeline.evaluation.speed.polar_bake import Stages
-from pipeline.evaluation.speed.processes import Compiling, RunFailedError, warm_run_s
+from pipeline.evaluation.speed.processes import Compiling, RunFailedError, warm_run
 from pipeline.evaluation.speed.setting import Setting
 from pipeline.evaluation.speed.stage_costs import BakeCost, StageCost
 from pipeline.evaluation.speed.timing import best_of
@@ -105,8 +105,8 @@ def test_the_stacks_transforms_agree(case: Setting) -> None:
 def test_of_two_bakes_the_better_times_count() -> None:
     of = CASES["plain"]
     baked = polar_bake.bake(setting.make(*of, PolarLayout(rings=24, azimuths=96)), 1)
-    slow = replace(baked, stages=Stages(1.0, 1.0, 1.0), second_light_s=9.0, kernel_s={"a": 1.0, "b": 4.0})
-    fast = replace(baked, stages=Stages(0.1, 2.0, 0.1), second_light_s=None, kernel_s={"a": 3.0, "b": 2.0})
+    slow = replace(baked, stages=Stages(1.0, 1.0, 1.0), lights_s=(4.0, 13.0), kernel_s={"a": 1.0, "b": 4.0})
+    fast = replace(baked, stages=Stages(0.1, 2.0, 0.1), lights_s=None, kernel_s={"a": 3.0, "b": 2.0})
     for found in (polar_bake.best(slow, fast), polar_bake.best(fast, slow)):
         assert found.stages.total == pytest.approx(2.2)
         assert found.second_light_s == 9.0
@@ -227,7 +227,7 @@ def test_a_large_scan_has_a_bound(peak_bytes: int | None, verdict: str) -> None:
 def test_a_run_that_fails_says_why(tmp_path: Path) -> None:
     failing = (sys.executable, "-c", "import sys; sys.exit('out of luck')")
     with pytest.raises(RunFailedError, match="out of luck"):
-        warm_run_s(failing, tmp_path / "no.toml")
+        warm_run(failing, tmp_path / "no.toml")
 
 
 def test_a_new_machine_has_bounds() -> None:

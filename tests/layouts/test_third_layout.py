@@ -52,7 +52,7 @@ def values(result: Result) -> np.ndarray:
 def test_it_is_planned(done: tuple[Path, dict[str, Result]]) -> None:
     stages = done[1]["plan"].json["third"]
     assert [s["stage"] for s in stages] == ["surface", "powers", "table", "textures", "render", "validate", "bundle"]
-    assert "21² nodes" in stages[1]["cost"]
+    assert "21² nodes" in stages[1]["work"]
 
 
 def test_it_is_baked_and_published(done: tuple[Path, dict[str, Result]]) -> None:

@@ -8,8 +8,9 @@ import pytest
 
 from pipeline.config.models import Config
 from pipeline.optics import geometry
-from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.scene import Direction, Scene, Views
+from pipeline.scene.lights import Parallel
+from pipeline.scene.model import Scene, Views
+from pipeline.scene.pairs import random_pairs
 from pipeline.stages.polar import scene_tiles
 from pipeline.stages.polar.scene_tiles import SceneTable
 from pipeline.store.store import Store
@@ -17,9 +18,9 @@ from pipeline.tables.polar.planning.plan import Plan
 from pipeline.tables.polar.table import PolarTable
 from tests.tables.planned import config, field_of, planned
 
-ONE, OTHER = Direction(theta_deg=20, phi_deg=100), Direction(theta_deg=50, phi_deg=200)
+ONE, OTHER = Parallel(theta_deg=20, phi_deg=100), Parallel(theta_deg=50, phi_deg=200)
 VIEWS = Views(theta_max_deg=25)
-MANY = [Direction(theta_deg=2.0 * k, phi_deg=37.0 * k) for k in range(16)]
+MANY = [Parallel(theta_deg=2.0 * k, phi_deg=37.0 * k) for k in range(16)]
 
 
 @cache
@@ -28,7 +29,7 @@ def full() -> tuple[Config, PolarTable, Plan]:
     return (found, *planned(found))
 
 
-def table_of(store: Store, lights: list[Direction], views: Views = VIEWS, surface: str = "s") -> SceneTable:
+def table_of(store: Store, lights: list[Parallel], views: Views = VIEWS, surface: str = "s") -> SceneTable:
     found, _, chosen = full()
     scene = Scene(lights=lights, views=views)
     return scene_tiles.scene_table(store, found.model_copy(update={"scene": scene}), field_of(found), surface, chosen)
@@ -40,7 +41,7 @@ def store(tmp_path: Path) -> Store:
 
 
 @pytest.mark.parametrize("lights", [[ONE], [ONE, OTHER], MANY])
-def test_it_answers_what_the_full_table_answers(store: Store, lights: list[Direction]) -> None:
+def test_it_answers_what_the_full_table_answers(store: Store, lights: list[Parallel]) -> None:
     made = table_of(store, lights)
     assert len(made.tables) == (1 if len(lights) == 16 else len(lights))
     uvw = geometry.uvw(*random_pairs(Scene(lights=lights, views=VIEWS), 2000, 9))
@@ -82,7 +83,7 @@ def test_a_damaged_tile_is_baked_again(store: Store) -> None:
 
 def test_savings_are_shares_of_the_full_bake(store: Store) -> None:
     found, _, chosen = full()
-    shelf = scene_tiles.shelf(found, field_of(found), "s", chosen, ONE)
+    shelf = scene_tiles.shelf(found, field_of(found), "s", chosen, ONE.centre)
     tiles = table_of(store, [ONE]).tables[0].tiles
     saved = shelf.savings(tiles)
     assert saved.texels == pytest.approx(1.0 - tiles.texels / tiles.grid.texels)

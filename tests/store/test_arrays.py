@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 import pytest
+import zarr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from zarr.codecs import Crc32cCodec
 
 from pipeline.store import arrays
 
@@ -72,6 +74,27 @@ def test_names_and_units_are_plain_zarr_3_metadata(tmp_path):
     assert height["dimension_names"] == ["y", "x"]
     assert height["attributes"] == {"units": "um", "long_name": "height"}
     assert (x["dimension_names"], x["attributes"]) == (["x"], {"units": "1/um"})
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("shape", [(3, 0), (300_001,), (4, 700_000)], ids=str)
+def test_files_are_those_that_zarr_writes(tmp_path, dtype, shape):
+    """Chunks, indices and descriptions are zarr's own, byte by byte."""
+    values = (100 * np.random.default_rng(1).random(shape) + 1).astype(dtype)
+    save_one(tmp_path / "a.zarr", values)
+    stored = zarr.open_array(tmp_path / "a.zarr/field")
+    zarr.create_group(tmp_path / "b.zarr", attributes={"kept": [1, 2.5, "x"]}).create_array(
+        "field",
+        data=values,
+        chunks=stored.chunks,
+        shards=stored.shards,
+        compressors=[Crc32cCodec()],
+        dimension_names=stored.metadata.dimension_names,
+        attributes={"units": "um"},
+    )
+    ours, zarrs = ({p.relative_to(root): p for p in root.rglob("*")} for root in sorted(tmp_path.iterdir()))
+    assert ours.keys() == zarrs.keys()
+    assert all(ours[p].read_bytes() == zarrs[p].read_bytes() for p in ours if ours[p].is_file())
 
 
 def test_one_file_holds_many_chunks(tmp_path):

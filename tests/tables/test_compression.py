@@ -18,6 +18,7 @@ from pipeline.tables.evaluate import Map
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.compression import Envelope, Textures, compress, flattened, most_textures, samples, whole
+from pipeline.tables.polar.spectral_integral import Integrand
 from pipeline.tables.polar.table import PolarTable
 from tests.support import snake
 
@@ -168,7 +169,8 @@ def snake_table(name: str) -> tuple[PolarTable, Array, Array, Array]:
     wi = np.broadcast_to([0.0, 0.0, 1.0], wr.shape)
     factor = brdf.direction_factor(material, trapezoid(light, 1.0), wi, wr)[:, None]
     truth = Reference(field, sigma, 380.0).xyz(light, material, wi, wr)
-    return polar.build(power, rings, rules, 8), geometry.uvw(wi, wr), factor, truth
+    (table,) = polar.build(power, rings, [Integrand(rules)], 8)
+    return table, geometry.uvw(wi, wr), factor, truth
 
 
 def in_half(textures: Textures) -> tuple[Textures, float]:

@@ -10,6 +10,7 @@ from pipeline.optics.light import Light, trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.spectral_integral import Integrand
 from pipeline.tables.polar.table import PolarTable
 from tests.diffraction.fields import SIGMA, power_spectrum_of
 
@@ -82,9 +83,7 @@ def test_the_table_of_a_mirror_is_its_specular_lobe() -> None:
     field = HeightField(np.full((100, 100), 3.0), (0.15, 0.15))
     power = power_spectrum_of(field, Azimuths(32))
     rings, rule = Rings(120, 0.1), trapezoid(Light(), 5.0)
-    table = polar.build(
-        power, rings, quadrature.uniform(rule, 120), 4, lambda nm, cos: np.ones((*cos.shape, len(nm)))
-    )
+    (table,) = polar.build(power, rings, [Integrand(quadrature.uniform(rule, 120))], 4)
     rho, phi = np.linspace(0.0, 0.3, 40), np.linspace(0.0, 6.0, 40)
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(40, -1.3)], axis=-1)
     lobe = np.exp(-((rho[:, None] / (1e-3 * rule.lambda_nm)) ** 2) * (2.0 * np.pi * SIGMA) ** 2)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from kernels import programs, spectral_operator
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.diffraction.reference import Reference
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.light import Light, Quadrature, trapezoid
+from pipeline.optics.light import LaserLine, Light, Quadrature, trapezoid
 from pipeline.optics.material import Material
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import line_points, quadrature, spectral_integral
@@ -121,3 +122,41 @@ def test_rings_that_share_points_agree_with_separate_rings(metal: bool, monkeypa
     level = np.sqrt(np.mean(alone.astype(np.float64) ** 2, axis=(2, 3), keepdims=True))
     np.testing.assert_array_less(np.abs(together - alone) / level, 2e-2)
     assert np.sqrt(np.mean(((together - alone) / level) ** 2)) < 1e-3
+
+
+@pytest.mark.parametrize("at_once", [4, 3])
+def test_lights_in_one_pass_have_the_tables_that_each_has_alone(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the last bit, whether they share all points, some or none, and in as many passes as they need."""
+    power, rings = power_spectrum_of(rough(), Azimuths(32, 0.8, 0.2)), Rings(140, 0.12)
+    gold = Radiometry(LIGHT, Material(fresnel="conductor"), SIGMA)
+    white = quadrature.choose(gold.illumination, rings.rho(), SIGMA, 3e-4)
+    others = [
+        quadrature.choose(Radiometry(light, Material(), SIGMA).illumination, rings.rho(), SIGMA, 3e-4)
+        for light in (
+            Light(illuminant="A"),
+            Light(range_nm=(600.0, 620.0)),
+            Light(illuminant=LaserLine(lambda_nm=532.0)),
+        )
+    ]
+    assert not np.array_equal(white.count, others[0].count)
+    integrands = [spectral_integral.Integrand(white, gold.reflectance), *map(spectral_integral.Integrand, others)]
+    of = power.values, power.radius_per_um, power.s_max_per_um, rings.rho()
+    alone = [spectral_integral.integrate(*of, each.quadratures, 8, each.reflectance) for each in integrands]
+    monkeypatch.setattr(programs, "MOST_W_TERMS", 8 * at_once)
+    together = spectral_integral.integrate_all(*of, integrands, 8)
+    for one, same in zip(alone, together, strict=True):
+        np.testing.assert_array_equal(one, same)
+
+
+def test_white_lights_share_their_points_whatever_they_need_of_wavelengths() -> None:
+    power, rho = power_spectrum_of(rough(), Azimuths(32, 0.8, 0.2)), Rings(140, 0.12).rho()
+    found = []
+    for name in ("A", "D65", "E"):
+        light = Radiometry(Light(illuminant=name), Material(), SIGMA)
+        rules = quadrature.choose(light.illumination, rho, SIGMA, 3e-4)
+        points = line_points.choose(power.radius_per_um, power.values.shape[2], power.s_max_per_um, rho, rules)
+        span, integrand = spectral_operator.whole_span(rho, points), spectral_integral.Integrand(rules)
+        found.append(spectral_integral.on_rings(rho, points, span, integrand, 8).groups())
+    assert found[0].keys() == found[1].keys() == found[2].keys()

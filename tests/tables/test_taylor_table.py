@@ -8,7 +8,8 @@ from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.evaluation.plain_numpy import paper_nodes
 from pipeline.optics.light import Light, Quadrature, trapezoid
-from pipeline.optics.scene import Direction, Scene, Views
+from pipeline.scene.lights import Parallel
+from pipeline.scene.model import Scene, Views
 from pipeline.surface import recipes
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.recipes.parameters import Blazed, Sinusoid
@@ -113,7 +114,7 @@ def test_look_up_between_nodes_is_bilinear_in_the_grid_coordinate() -> None:
 def test_a_scene_omits_nodes_and_does_not_change_the_others() -> None:
     """A fixed light reaches the disc of radius sin(theta_max) about -wi; look-ups outside it are NaN."""
     built, quadrature = taylor_stack(small(), 2.0)
-    light = Direction(theta_deg=30.0, phi_deg=90.0)
+    light = Parallel(theta_deg=30.0, phi_deg=90.0)
     scene = Scene(lights=[light], views=Views(theta_max_deg=40.0))
     whole, part = taylor.build(built, quadrature, 41, 2.0), taylor.build(built, quadrature, 41, 2.0, scene)
     assert np.count_nonzero(part.computed) < 0.4 * np.count_nonzero(whole.computed)

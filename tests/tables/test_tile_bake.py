@@ -9,17 +9,18 @@ from pipeline.config.models import Config
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.optics import geometry
-from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.scene import Direction, Scene, Views
+from pipeline.scene.lights import Parallel
+from pipeline.scene.model import Scene, Views
+from pipeline.scene.pairs import random_pairs
 from pipeline.tables.polar.planning import plan
-from pipeline.tables.polar.reach import reach, unit_vector
+from pipeline.tables.polar.reach import reach
 from pipeline.tables.polar.table import PolarTable
 from pipeline.tables.polar.tile_bake import TileBake, TileTable, assemble
 from tests.tables.planned import SIGMA, config, field_of
 
 GRID = PolarGrid(Rings(96, 0.5), Azimuths(640, 0.9, 0.2))
-OBLIQUE = Scene(lights=[Direction(theta_deg=40, phi_deg=150)], views=Views(theta_max_deg=20))
-NORMAL = Scene(lights=[Direction(theta_deg=0)])
+OBLIQUE = Scene(lights=[Parallel(theta_deg=40, phi_deg=150)], views=Views(theta_max_deg=20))
+NORMAL = Scene(lights=[Parallel(theta_deg=0)])
 LINE = {"spectrum": {"illuminant": {"lambda_nm": 532}}}
 GOLD = {"material": {"fresnel": "conductor", "metal": "Au"}}
 
@@ -36,7 +37,7 @@ def settings(found: Config, scene: Scene | None) -> TileBake:
         budget=budget,
         layout=found.table,
     )
-    return TileBake(bake, GRID, None if scene is None else unit_vector(scene.lights[0]), terms)
+    return TileBake(bake, GRID, None if scene is None else scene.lights[0].centre, terms)
 
 
 @cache
@@ -90,7 +91,7 @@ def test_a_tile_does_not_depend_on_those_that_are_baked_with_it() -> None:
 
 def test_what_no_tile_covers_and_what_another_light_lights_is_unknown() -> None:
     lit, _ = lit_of("white", OBLIQUE)
-    wi = unit_vector(OBLIQUE.lights[0])
+    wi = OBLIQUE.lights[0].centre
     outside = geometry.direction(np.radians(70.0), np.radians(150.0))
     assert np.isnan(lit.look_up(-(wi + outside)[None])).all()
     normal = np.array([0.0, 0.0, 1.0])

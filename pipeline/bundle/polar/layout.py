@@ -19,7 +19,7 @@ from pipeline.bundle.layout import (
     TableImage,
 )
 from pipeline.optics.colour import ColourError
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
 from pipeline.validated import Finite
 
 Length = Annotated[float, Field(ge=1e-9, le=1e9)]
@@ -97,13 +97,14 @@ class PolarGridEntry(GridEntry):
 
     def contradictions(self, images: int, scene: Scene | None) -> list[str]:
         """Compares the basis with the outputs that the images hold, and the last ring with the scene."""
-        from pipeline.tables.polar.planning.plan import rho_max
+        from pipeline.scene.visited import rho_max
 
-        found, expected = [], rho_max(scene)
+        found: list[str] = []
         if not self._basis_fits(images):
             found.append(f"grid: {images} tables do not hold the outputs that basis and w_terms need")
-        if abs(self.rho_max - expected) > SINE_ROUNDS:
-            found.append(f"grid.rho_max is {self.rho_max:g}, but the scene reaches {expected:g}")
+        # what cameras see is found with files that the bundle does not hold
+        if (scene is None or scene.cameras is None) and abs(self.rho_max - rho_max(scene)) > SINE_ROUNDS:
+            found.append(f"grid.rho_max is {self.rho_max:g}, but the scene reaches {rho_max(scene):g}")
         return found
 
     def _basis_fits(self, images: int) -> bool:

@@ -16,7 +16,7 @@ from pipeline.config.models import Config, Publish
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import ColourError, delta_e
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.tables.evaluate import interpolator, table_evaluator
 from pipeline.tables.polar.compression import (
     CHANNELS,

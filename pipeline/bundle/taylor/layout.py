@@ -22,7 +22,7 @@ from pipeline.bundle.layout import (
     TableImage,
     TexelCheck,
 )
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
 from pipeline.validated import Positive
 
 
@@ -70,6 +70,9 @@ class TaylorGridEntry(GridEntry):
         from pipeline.tables.taylor import grid
         from pipeline.tables.taylor.table import reachable_nodes
 
+        # another machine reads no files for a bundle
+        if scene is not None and not scene.is_portable:
+            return np.zeros((self.width, self.width), bool)
         if scene is not None:
             views = scene.views.model_copy(update={"theta_max_deg": scene.views.theta_max_deg * (1.0 - SINE_ROUNDS)})
             scene = scene.model_copy(update={"views": views})

@@ -14,7 +14,7 @@ from pipeline.bundle.taylor.layout import TaylorLoss
 from pipeline.config.models import Config
 from pipeline.errors import AccuracyError
 from pipeline.optics.colour import delta_e
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.taylor.table import TaylorTable
 

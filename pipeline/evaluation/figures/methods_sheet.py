@@ -35,8 +35,8 @@ from pipeline.optics import brdf
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.colour import delta_e
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress
+from pipeline.scene.pairs import random_pairs
 from pipeline.tables.evaluate import Map
 
 _COLUMNS = 5

@@ -28,8 +28,9 @@ from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour import EXPOSURES_RU, delta_e
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
-from pipeline.optics.scene import Direction, Scene
 from pipeline.progress import Progress
+from pipeline.scene.lights import Direction, Parallel
+from pipeline.scene.model import Scene
 from pipeline.tables.polar.layout import PolarLayout
 
 LIGHT = Direction(theta_deg=45.0, phi_deg=180.0)
@@ -123,7 +124,7 @@ def experiment(config: Config) -> Config:
             "material": Material(fresnel="conductor", metal="Au", normalisation="relative"),
             "table": PolarLayout(),
             "accuracy": Accuracy(delta_e=DELTA_E),
-            "scene": Scene(lights=[LIGHT]),
+            "scene": Scene(lights=[Parallel(theta_deg=LIGHT.theta_deg, phi_deg=LIGHT.phi_deg)]),
         }
     )
 

@@ -24,9 +24,10 @@ from pipeline.evaluation.texts import Texts
 from pipeline.optics import geometry
 from pipeline.optics.colour import delta_e
 from pipeline.optics.light import LaserLine, Light
-from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.scene import Direction, Scene, Views
 from pipeline.progress import Progress
+from pipeline.scene.lights import Parallel
+from pipeline.scene.model import Scene, Views
+from pipeline.scene.pairs import random_pairs
 from pipeline.stages.polar import power_spectrum, scene_tiles
 from pipeline.stages.polar.scene_tiles import Savings, Shelf
 from pipeline.stages.surface import field_of
@@ -43,8 +44,8 @@ from pipeline.tables.polar.reach import of_directions, reach
 from pipeline.tables.polar.table import PolarTable
 from pipeline.tables.polar.tile_bake import TileTable
 
-_NORMAL = Direction(theta_deg=0.0)
-_SECOND = Direction(theta_deg=30.0, phi_deg=180.0)
+_NORMAL = Parallel(theta_deg=0.0)
+_SECOND = Parallel(theta_deg=30.0, phi_deg=180.0)
 _LASER = Light(illuminant=LaserLine(lambda_nm=532.0))
 _ON_NORMAL, _ON_SCREEN = "normal light", "laser on a screen"
 _SCREEN_DEG, _SCREEN_SAMPLES = 60.0, 1500
@@ -121,8 +122,8 @@ class _Bench:
     def places(self) -> Places:
         return windows.places(self.field.extent, self.config.coherence)
 
-    def shelf(self, light: Direction) -> Shelf:
-        return scene_tiles.shelf(self.config, self.field, self._surface, self.plan, light)
+    def shelf(self, wi: Array) -> Shelf:
+        return scene_tiles.shelf(self.config, self.field, self._surface, self.plan, wi)
 
     def errors(self, table: Table, wi: Array, wr: Array, exact: Array) -> Array:
         """Return the CIELAB differences of a table from XYZ (directions, 3) at the exposure of all errors here."""
@@ -164,7 +165,7 @@ def _surface(config: Config, progress: Progress) -> SceneCosts:
     white, laser = _Bench(config, field, config.light), _Bench(config, field, _LASER)
     normal, (wi, wr) = Scene(lights=[_NORMAL]), _screen()
     of_normal, of_screen = reach(normal, white.full.grid), of_directions(laser.full.grid, geometry.uvw(wi, wr))
-    shelves = {_ON_NORMAL: white.shelf(_NORMAL), _ON_SCREEN: laser.shelf(LIGHT)}
+    shelves = {_ON_NORMAL: white.shelf(_NORMAL.centre), _ON_SCREEN: laser.shelf(LIGHT.vector)}
     tiles = {_ON_NORMAL: of_normal.tiles(), _ON_SCREEN: of_screen.tiles()}
     works: dict[str, Callable[[], Any]] = {"full": white.bake_full, "laser, full": laser.bake_full}
     works |= {name: partial(shelf.bake, tiles[name].covered) for name, shelf in shelves.items()}
@@ -235,13 +236,13 @@ def _check_reuse(check: Callable[..., None], bench: _Bench, store: Store) -> Non
     """Check which tiles are baked when a scene changes."""
     narrow = Scene(lights=[_SECOND], views=Views(theta_max_deg=20.0))
     wide, grid = Scene(lights=[_SECOND], views=Views(theta_max_deg=40.0)), bench.full.grid
-    first = scene_tiles.table(store, bench.shelf(_NORMAL), reach(Scene(lights=[_NORMAL]), grid).tiles())
+    first = scene_tiles.table(store, bench.shelf(_NORMAL.centre), reach(Scene(lights=[_NORMAL]), grid).tiles())
     tiles = reach(narrow, grid).tiles()
-    second = scene_tiles.table(store, bench.shelf(_SECOND), tiles)
+    second = scene_tiles.table(store, bench.shelf(_SECOND.centre), tiles)
     check("first_light_again", first.baked, f"the second light's own: {second.baked}")
     wider = reach(wide, grid).tiles()
-    added = scene_tiles.table(store, bench.shelf(_SECOND), wider)
+    added = scene_tiles.table(store, bench.shelf(_SECOND.centre), wider)
     new = int(np.sum(wider.covered & ~tiles.covered))
     check("wider_views", added.baked - new, f"{added.baked} baked, {int(wider.covered.sum())} covered")
-    back = scene_tiles.table(store, bench.shelf(_SECOND), tiles)
+    back = scene_tiles.table(store, bench.shelf(_SECOND.centre), tiles)
     check("changed_back", back.baked, f"{int(tiles.covered.sum())} covered")

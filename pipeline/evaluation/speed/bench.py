@@ -134,7 +134,7 @@ def _field(config: Config, store: Store, progress: Progress) -> HeightField:
 
 def _with_whole_run(found: SurfaceSpeed, command_line: Sequence[str], path: Path, progress: Progress) -> SurfaceSpeed:
     try:
-        return replace(found, whole_run_s=processes.warm_run_s(command_line, path, progress))
+        return replace(found, whole_run=processes.warm_run(command_line, path, progress))
     except RunFailedError as error:
         return replace(found, whole_run_fault=f"run --until table failed: {error}")
 

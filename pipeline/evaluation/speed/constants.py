@@ -13,7 +13,7 @@ _KERNELS = {
     "USUAL_TAPS": ("polar_power_spectrum",),
     "NODES": ("polar_power_spectrum",),
     "W_BLOCK": ("apply_operator",),
-    "XYZ_HALVES": ("apply_operator",),
+    "XYZ_VECTORS": ("apply_operator",),
 }
 
 

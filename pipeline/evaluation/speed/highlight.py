@@ -39,7 +39,7 @@ class PlannedTable:
 def planned(field: HeightField, config: Config, truth: MapTruth, reference: Reference) -> PlannedTable:
     """Plan and make the table of a surface, and measure its largest errors."""
     power, chosen = setting.first_bake(field, config, PolarLayout())
-    table = chosen.table(power, config.light)
+    table = chosen.table(power)
     flank = check_flank(table_evaluator(table, config.radiometry), reference, config)
     return PlannedTable(chosen.plan.texels, flank, truth.error(table, FLANK_RU))
 

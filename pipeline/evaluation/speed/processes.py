@@ -4,13 +4,14 @@ import os
 import shutil
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 
 from pipeline.progress import Progress, silent
 from pipeline.store import scratch
+from pipeline.store.store import Store
 
 # a first config, and one of other terms, nodes in s, terms in |w| and window reach
 _FIRST = '[surface]\nrecipe = { kind = "blazed", period_um = 2.5, height_um = 0.25 }\n'
@@ -44,28 +45,42 @@ class RunFailedError(RuntimeError):
 
 @dataclass(frozen=True)
 class Spent:
-    """Seconds from a process's start to its end, and processor seconds of it and of its children."""
+    """What a process took from its start to its end.
+
+    seconds: on the clock. cpu_s: processor seconds of it and of its children. stages: seconds of each stage, in
+    order; the rest of `seconds` is the start of the process, imports and digests of artifacts.
+    """
 
     seconds: float
     cpu_s: float
+    stages: Mapping[str, float]
+
+    def __str__(self) -> str:
+        """Names the seconds of every part."""
+        rest = self.seconds - sum(self.stages.values())
+        parts = [*self.stages.items(), ("start, imports and digests", rest)]
+        told = " + ".join(f"{name} {seconds:.2f}" for name, seconds in parts)
+        return f"{told} s; {self.cpu_s:.2f} s of processors"
 
 
-def run(words: Sequence[str], config: Path, cache: Path | None = None, until: str | None = None) -> Spent:
-    """Run a config with an empty store.
+def run(words: Sequence[str], configs: Sequence[Path], cache: Path | None = None, until: str | None = None) -> Spent:
+    """Run configs with an empty store.
 
     words: those that start the tool, before the name of a command. cache: folder of caches, kernels included; None
     for the user's own. until: the last stage; None for all. Raises RunFailedError.
     """
     environment = dict(os.environ) if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
     with scratch.temporary() as folder:
-        command = [*words, "run", str(config), "--store", f"{folder}/store", "--out", f"{folder}/out"]
+        command = [*words, "run", *map(str, configs), "--store", f"{folder}/store", "--out", f"{folder}/out"]
         command += [] if until is None else ["--until", until]
         before, started = getrusage(RUSAGE_CHILDREN), time.perf_counter()
         ended = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment, text=True)
         seconds, after = time.perf_counter() - started, getrusage(RUSAGE_CHILDREN)
+        made = sorted(Store(folder / "store").artifacts(), key=lambda artifact: len(artifact.record["inputs"]))
     if ended.returncode != 0:
         raise RunFailedError(ended.stderr.strip().rpartition("\n")[2])
-    return Spent(seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    stages = {artifact.stage: artifact.record["provenance"]["seconds"] for artifact in made}
+    return Spent(seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, stages)
 
 
 def write_config(folder: Path, name: str, text: str) -> Path:
@@ -75,16 +90,16 @@ def write_config(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-def warm_run_s(command_line: Sequence[str], config: Path, progress: Progress = silent) -> float:
-    """Return the seconds of `run --until table` with an empty store and warm kernels, the fastest of five.
+def warm_run(command_line: Sequence[str], config: Path, progress: Progress = silent) -> Spent:
+    """Run `run --until table` with an empty store and warm kernels, and return the fastest of five.
 
     One more run, the first, fills the kernel cache. Raises RunFailedError.
     """
-    seconds = []
+    runs = []
     for i in range(_WHOLE_RUNS):
-        seconds.append(run(command_line, config, until="table").seconds)
+        runs.append(run(command_line, [config], until="table"))
         progress("whole runs", (i + 1) / _WHOLE_RUNS)
-    return min(seconds[1:])
+    return min(runs[1:], key=lambda each: each.seconds)
 
 
 @dataclass(frozen=True)
@@ -112,7 +127,7 @@ def measure_compiling(command_line: Sequence[str], progress: Progress = silent) 
         first, other = write_config(root, "first", _FIRST), write_config(root, "next", _NEXT)
 
         def cpu_s(path: Path) -> float:
-            spent = run(command_line, path, cache, until="table").cpu_s
+            spent = run(command_line, [path], cache, until="table").cpu_s
             progress("compiling", next(done) / 8.0)
             return spent
 
@@ -131,7 +146,7 @@ def measure_compiling(command_line: Sequence[str], progress: Progress = silent) 
         warm_next = min(cpu_s(other), cpu_s(other))
         forget_kernels()
         bakes = [
-            run(command_line, write_config(root, name, text), cache).seconds
+            run(command_line, [write_config(root, name, text)], cache).seconds
             for name, text in (("elaphe", _FIRST_BAKE), ("xenopeltis", _SECOND_BAKE))
         ]
     return Compiling(cold - warm, max(cold_next - warm_next, 0.0), *bakes)

@@ -1,5 +1,6 @@
 """A polar table to be timed, and the same table's integral for other algorithms."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
@@ -17,7 +18,7 @@ from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import Light, Quadrature
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import MIDDLE
-from pipeline.tables.polar import spectral_integral
+from pipeline.tables.polar import spectral_integral, table
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.planning import plan
@@ -45,11 +46,15 @@ class Setting:
         """The wavelengths of every ring under the config's own light."""
         return self.bake.rules(self.plan.rings.rho())
 
-    def table(self, made: PolarPowerSpectrum, light: Light | None = None) -> PolarTable:
-        """Choose wavelengths and make the table; `light` replaces the config's by another of the same range."""
-        radiometry = replace(self.bake.radiometry, light=light or self.bake.radiometry.light)
-        bake = replace(self.bake, radiometry=radiometry)
-        return bake.table(made, self.plan.rings, bake.rules(self.plan.rings.rho()))
+    def table(self, made: PolarPowerSpectrum) -> PolarTable:
+        """Choose wavelengths and make the table."""
+        return self.bake.table(made, self.plan.rings, self.bake.rules(self.plan.rings.rho()))
+
+    def tables(self, made: PolarPowerSpectrum, lights: Sequence[Light]) -> list[PolarTable]:
+        """Choose wavelengths and make the tables of several lights of the config's range in one pass."""
+        bakes = [replace(self.bake, radiometry=replace(self.bake.radiometry, light=light)) for light in lights]
+        integrands = [bake.integrand(bake.rules(self.plan.rings.rho())) for bake in bakes]
+        return table.build(made, self.plan.rings, integrands, self.plan.w_terms)
 
     def samples(self, made: PolarPowerSpectrum) -> NDArray[np.float64]:
         """Return the table's samples (rings, 3, w nodes, azimuths) before splines are put through them."""

@@ -17,6 +17,7 @@ from pipeline.evaluation.speed.machine import Timed
 from pipeline.evaluation.speed.nufft import NufftRun
 from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM, Paper
 from pipeline.evaluation.speed.polar_bake import Stages, TimedBake
+from pipeline.evaluation.speed.processes import Spent
 from pipeline.evaluation.speed.timing import best_of, timed
 from pipeline.evaluation.speed.transforms import Transforms
 from pipeline.evaluation.speed.truth import MapTruth
@@ -124,7 +125,7 @@ class SurfaceSpeed:
     samples: (ny, nx). terms, nodes, w_terms: of the polar table of layout MAIN, as are stages and second_light_s.
     timed: work and seconds of stages and kernels. agreement: difference of "nufft" and "numpy" from the kernels, of
     samples over max(sample, 1e-7 of the mirror). memory_bytes: the peak of a process that bakes that table. notes:
-    omissions with their reasons. planned: the table of the planner. whole_run_s: a process from its start to the
+    omissions with their reasons. planned: the table of the planner. whole_run: a process from its start to the
     table, kernels warm; whole_run_fault: why it was not measured.
     """
 
@@ -145,7 +146,7 @@ class SurfaceSpeed:
     memory_bytes: int | None
     notes: list[str]
     planned: PlannedTable
-    whole_run_s: float | None = None
+    whole_run: Spent | None = None
     whole_run_fault: str = ""
 
     def point(self, method: str, **settings: float) -> Point | None:

@@ -26,7 +26,7 @@ from pipeline.optics.coherence import Coherence
 from pipeline.optics.colour import delta_e
 from pipeline.optics.light import Quadrature
 from pipeline.optics.material import Material
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.stages import run, surface
 from pipeline.store import scratch
 from pipeline.store.store import Store

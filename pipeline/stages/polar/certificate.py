@@ -12,11 +12,11 @@ from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import random_pairs
 from pipeline.progress import Progress, silent
+from pipeline.scene.pairs import random_pairs
+from pipeline.scene.visited import rho_max
 from pipeline.tables.evaluate import Evaluator
 from pipeline.tables.polar import spectral
-from pipeline.tables.polar.planning import plan
 
 _SPECTRAL_DIRECTIONS, _SPECTRAL_STEP_NM, _SEED = 500, 50.0, 77003
 
@@ -42,7 +42,7 @@ def _remedy(reference: Reference, config: Config) -> str:
     """Suggests what to do about a missed budget; a grid cannot resolve the hard cut at the scan's Nyquist limit."""
     text = 'Raise accuracy.delta_e, or leave table.rings, azimuths, terms and w_terms on "auto".'
     band = min(reference.field.band_limit_per_um)
-    if band >= plan.rho_max(config.scene) / (1e-3 * config.light.lambda_min_nm):
+    if band >= rho_max(config.scene) / (1e-3 * config.light.lambda_min_nm):
         return text
     return (
         f"{text} If light is still bright at {band:.3g} per um, the scan's Nyquist limit, no table resolves the hard "

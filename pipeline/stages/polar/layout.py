@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pipeline.accuracy.convergence import CoarseMap, Study
 from pipeline.arrays import Array
 from pipeline.config.models import Config
+from pipeline.optics.light import Light
 from pipeline.stages.foreseen import WayOut
 from pipeline.stages.layout import Layout
 from pipeline.stages.polar import power_spectrum, sizes, table, textures
@@ -15,6 +16,7 @@ from pipeline.stages.stage import Inputs, Summary
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import Evaluator
 from pipeline.tables.polar import spectral
+from pipeline.tables.polar.planning import plan
 
 if TYPE_CHECKING:
     from pipeline.bundle.layout import Prepared
@@ -22,10 +24,16 @@ if TYPE_CHECKING:
 _PLANNED = ("terms", "s_nodes", "w_terms", "probed_delta_e", "windows", "speckle_contrast")
 
 
-def _study(config: Config, inputs: Inputs, evaluate: Evaluator, coarse: CoarseMap) -> Study:
+def _studied(config: Config) -> Config:
+    """Returns the config whose light and material the curves have: those of the planner, whatever a config's are."""
+    light = config.light if config.light.is_line else Light(illuminant="E", range_nm=config.light.range_nm)
+    return config.model_copy(update={"light": light, "material": plan.MATERIAL})
+
+
+def _study(config: Config, inputs: Inputs, _evaluate: Evaluator, coarse: CoarseMap) -> Study:
     """Returns the curves of error against rings, azimuths, terms in |w| and wavelength step."""
     layout, planned = power_spectrum.layout_of(config), power_spectrum.planned(inputs["power_spectrum"])
-    return PolarStudy(power_spectrum.of(inputs), planned, layout, evaluate, coarse).curves()
+    return PolarStudy(power_spectrum.of(inputs), planned, layout, coarse).curves()
 
 
 def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
@@ -85,7 +93,11 @@ LAYOUT = Layout(
     table_of=table.of,
     stored_of=textures.table_of,
     study=_study,
-    study_remark="Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked.",
+    studied=_studied,
+    study_remark=(
+        "Curves are those of the planner: equal-energy light or the laser line, observer of 1931, index 1.5. "
+        "Azimuths are thinned evenly. All rings share one step; the mean of the chosen steps is marked."
+    ),
     sizes=sizes.sizes,
     ways_out=(
         WayOut("table.azimuths", 32, multiple=32),

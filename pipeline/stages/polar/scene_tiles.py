@@ -13,7 +13,8 @@ from pipeline.diffraction import dft_stack
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.scene import Direction, Scene
+from pipeline.scene.lights import Parallel
+from pipeline.scene.model import Scene
 from pipeline.stages.polar import power_spectrum
 from pipeline.stages.stage import kernel_digest, light_parameters, material_parameters
 from pipeline.store import digest
@@ -24,7 +25,7 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
 from pipeline.tables.polar.planning import plan, trial
 from pipeline.tables.polar.planning.plan import Plan
-from pipeline.tables.polar.reach import reach, unit_vector
+from pipeline.tables.polar.reach import reach
 from pipeline.tables.polar.tile_bake import Samples, TileBake, TileTable, assemble
 
 _VERSION = 1
@@ -133,13 +134,12 @@ def scene_table(store: Store, config: Config, field: HeightField, surface_key: s
     without a scene. Raises the errors of `table`.
     """
 
-    def on_shelf(light: Direction | None) -> Shelf:
-        return shelf(config, field, surface_key, planned, light)
+    def on_shelf(wi: Array | None) -> Shelf:
+        return shelf(config, field, surface_key, planned, wi)
 
-    scene, every = config.scene, on_shelf(None)
-    tiles = reach(scene, every.tile.grid).tiles()
-    alone = [] if scene is None else [Scene(lights=[light], views=scene.views) for light in scene.lights]
-    by_light = [(on_shelf(each.lights[0]), reach(each, every.tile.grid).tiles()) for each in alone]
+    every = on_shelf(None)
+    tiles = reach(config.scene, every.tile.grid).tiles()
+    by_light = [(on_shelf(wi), reach(alone, every.tile.grid).tiles()) for wi, alone in _by_light(config.scene)]
     bytes_by_light = sum(each.tile.outputs * its.texels for each, its in by_light)
     if by_light and bytes_by_light < every.tile.outputs * tiles.texels:
         found = [table(store, each, its) for each, its in by_light]
@@ -148,14 +148,27 @@ def scene_table(store: Store, config: Config, field: HeightField, surface_key: s
     return SceneTable(tuple(each.table for each in found), sum(each.baked for each in found))
 
 
-def shelf(config: Config, field: HeightField, surface_key: str, planned: Plan, light: Direction | None) -> Shelf:
+def _by_light(scene: Scene | None) -> list[tuple[Array, Scene]]:
+    """Splits a scene of parallel light on a flat sample, where (u, v) determines |w|, into those of one light.
+
+    Returns each light's unit vector (3,) and scene; nothing for other scenes. Lights below the horizon light nothing.
+    """
+    if scene is None or scene.mesh is not None:
+        return []
+    parallel = [light for light in scene.lights if isinstance(light, Parallel)]
+    if len(parallel) < len(scene.lights):
+        return []
+    above = [light for light in parallel if light.centre[2] > 0.0]
+    return [(light.centre, scene.model_copy(update={"lights": [light]})) for light in above]
+
+
+def shelf(config: Config, field: HeightField, surface_key: str, planned: Plan, wi: Array | None) -> Shelf:
     """Returns the shelf of a light, or of polynomials in |w| for all lights.
 
     config: its coherence, light, material and budget are read, and no scene. field: the surface, with its address.
-    planned: the plan of a table without a scene.
+    planned: the plan of a table without a scene. wi: unit vector towards the light (3,), None for all lights.
     """
     budget, layout = power_spectrum.budget(config), power_spectrum.layout_of(config)
-    wi = None if light is None else unit_vector(light)
     bake = planned.bake(config.radiometry, budget, layout)
     w_terms = partial(
         plan.w_terms_within, half_range_um=field.half_range_um, light=config.light, budget=budget, layout=layout

@@ -16,7 +16,7 @@ from pipeline.store.arrays import loading_bytes, saving_bytes
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.planning import plan, trial
-from pipeline.tables.polar.planning.grid_search import Grids
+from pipeline.tables.polar.planning.grid_search import GRID_SHARE, Grids
 from pipeline.tables.polar.spectral_integral import IntegralSize
 
 # tables that the search for a grid measures, and tables of the curves that `validate` shows
@@ -65,7 +65,17 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         stored_bytes=0 if is_whole else 3 * integral.table_bytes // 2,
         # an image has four channels, here and in OpenEXR
         prepared=Need({"image": 2 * 4 * 4 * rings.count * azimuths}),
+        written_bytes=e_bytes,
+        delta_e=_expected_delta_e(foreseen),
     )
+
+
+def _expected_delta_e(foreseen: Foreseen) -> float | None:
+    """Returns the error that the search for a grid measured or will aim at; None for a grid that the config sets."""
+    if "power_spectrum" in foreseen.made:
+        return power_spectrum.plan_in(foreseen.made["power_spectrum"]).probed_delta_e
+    layout = power_spectrum.layout_of(foreseen.config)
+    return GRID_SHARE * foreseen.config.budget_delta_e if "auto" in (layout.rings, layout.azimuths) else None
 
 
 def _transform(

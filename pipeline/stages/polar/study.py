@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.accuracy.convergence import CoarseMap, Curve, Study
 from pipeline.diffraction.polar_grid import TILE, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
-from pipeline.tables.evaluate import Evaluator, table_evaluator
+from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar import quadrature
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
@@ -23,20 +23,18 @@ class PolarStudy:
         power: PolarPowerSpectrum,
         planned: plan.Plan,
         layout: PolarLayout,
-        chosen: Evaluator,
         views: CoarseMap,
     ) -> None:
         """Prepares the study.
 
-        power: the power spectrum E of the table. planned: the table's plan. layout: its settings.
-        chosen: evaluator of the table itself. views: the map.
+        power: the power spectrum E of the table. planned: the table's plan. layout: its settings. views: the map.
         """
         self._power, self._plan, self._views = power, planned, views
         config = self._config = views.config
         allowed = plan.Budget(config.budget_delta_e, config.accuracy.exposure_ru)
         self._bake = planned.bake(config.radiometry, allowed, layout)
-        self._chosen = views.error(chosen)
         self._rules = self._bake.rules(planned.rings.rho())
+        self._chosen = self._error(self._bake, self._rules, power)
 
     def curves(self) -> Study:
         """Returns one function per setting, which computes its curve; a laser line has no wavelength step."""

@@ -91,4 +91,4 @@ def _work(config: Config) -> str:
     return f"{layout.rings} rings x {layout.azimuths} azimuths"
 
 
-TABLE = Stage("table", 7, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)
+TABLE = Stage("table", 8, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)

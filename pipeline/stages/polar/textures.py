@@ -40,7 +40,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 
 
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
-    from pipeline.accuracy.checks import check_flank
+    from pipeline.accuracy.checks import check_border, check_flank
     from pipeline.bundle.polar import storage
 
     certificate = inputs.summary("table")["certificate"]
@@ -60,7 +60,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     inputs.keep(stored)
     measured = storage.mean_error(random, config)
     kept = measured <= config.budget_delta_e
-    flank = check_flank(interpolator(stored.textures, config.radiometry), reference, config)
+    interpolate = interpolator(stored.textures, config.radiometry)
+    flank, border = (check(interpolate, reference, config) for check in (check_flank, check_border))
     return {
         "loss": loss.model_dump(mode="json"),
         "certificate": {
@@ -69,6 +70,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             "measured": measured,
             "random": asdict(random),
             "flank": None if flank is None else asdict(flank),
+            "border": None if border is None else asdict(border),
         },
     }
 
@@ -99,4 +101,4 @@ def _load(inputs: Inputs) -> "Stored":
     return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
 
 
-TEXTURES = Stage("textures", 2, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)
+TEXTURES = Stage("textures", 3, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

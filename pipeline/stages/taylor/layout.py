@@ -62,6 +62,7 @@ LAYOUT = Layout(
     table_of=table.of,
     stored_of=textures.table_of,
     study=_study,
+    studied=lambda config: config,
     study_remark="Terms and step are varied at the directions of the map itself, without a grid.",
     sizes=sizes.sizes,
     ways_out=(

@@ -74,6 +74,7 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         study=Need(study, taylor.seconds(_STUDIED_NODES, wavelengths, terms, chosen)),
         textures=Need(storing if in_half else {}, reference.seconds(_CERTIFIED, foreseen.wavelengths)),
         stored_bytes=table_bytes if in_half else 0,
+        written_bytes=stack_bytes,
         prepared=Need({"images": storage.planes_bytes(layout.resolution)}),
     )
 

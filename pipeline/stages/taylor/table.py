@@ -81,4 +81,4 @@ def _work(config: Config) -> str:
     return f"{layout.resolution}² nodes x {layout.step_nm:g} nm steps"
 
 
-TABLE = Stage("table", 3, ("surface", "stack"), _parameters, _produce, uses_device=True, work=_work)
+TABLE = Stage("table", 4, ("surface", "stack"), _parameters, _produce, uses_device=True, work=_work)

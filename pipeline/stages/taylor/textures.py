@@ -56,4 +56,4 @@ def table_of(inputs: Inputs) -> TaylorTable:
     return inputs.shared("textures", lambda _: storage.in_half(baked, storage.scales(baked, "half")))
 
 
-TEXTURES = Stage("textures", 1, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)
+TEXTURES = Stage("textures", 2, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

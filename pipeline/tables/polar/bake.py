@@ -15,7 +15,7 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import MIDDLE, Places
 from pipeline.tables.polar import quadrature, spectral_integral
 from pipeline.tables.polar import table as polar
-from pipeline.tables.polar.spectral_integral import IntegralSize
+from pipeline.tables.polar.spectral_integral import IntegralSize, Integrand
 from pipeline.tables.polar.table import PolarTable
 
 
@@ -91,4 +91,8 @@ class PolarBake:
 
     def table(self, power: PolarPowerSpectrum, rings: Rings, rules: RingQuadratures) -> PolarTable:
         """Integrates E over the wavelengths of every ring. Raises ResourceError if that does not fit into memory."""
-        return polar.build(power, rings, rules, self.w_terms, self.radiometry.reflectance)
+        return polar.build(power, rings, [self.integrand(rules)], self.w_terms)[0]
+
+    def integrand(self, rules: RingQuadratures) -> Integrand:
+        """Combines the wavelengths of the rings with the material; several lights' serve `table.build`."""
+        return Integrand(rules, self.radiometry.reflectance)

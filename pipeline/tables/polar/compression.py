@@ -25,8 +25,8 @@ from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
-from pipeline.optics.random_directions import random_pairs
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
+from pipeline.scene.pairs import random_pairs
 from pipeline.tables.polar.table import PolarTable, w_position
 
 CHANNELS = 4  # outputs per texture: RGBA

@@ -63,9 +63,9 @@ class _Lines:
         self.rate += self._share_rate * self._distances / _STEP_BETWEEN
         # a point between radii costs twice as much
         self.on_radii = (
-            (self.first >= 0) & self._resolved(self.last) & (self.last + 1 - self.first <= 2 * self.wavelengths)
+            (self.first >= 0) & self._resolved(self.last) & (self.last + 1 - self.first <= 2 * quadratures.usual)
         )
-        self.on_nodes = ~self.on_radii & (self.wavelengths <= _steps(self.low, self.high, self.rate)[0])
+        self.on_nodes = ~self.on_radii & (quadratures.usual <= _steps(self.low, self.high, self.rate)[0])
 
     def _within_limit(self, r: Array) -> NDArray[np.bool_]:
         """Whether the lines up to r remain within the extrapolation limit in s."""

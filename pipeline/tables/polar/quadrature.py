@@ -21,9 +21,14 @@ from pipeline.errors import AccuracyError
 from pipeline.optics.light import FINE_STEP_NM, Light, Quadrature
 
 _STEPS_NM = (20.0, 10.0, 5.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
+# the step that D65 takes beside the mirror direction, where the window asks for none
+_STEP_OF_DAYLIGHT_NM = 4.0
 # the squared autocorrelation of the window, exp(-x^2 / (2 sigma^2)), is 3e-4 at 4 sigma
 _REACH_SIGMAS, _POINTS = 4.0, 48
 _GRID_POINTS = 256
+# complex multiply-adds of a product that OpenBLAS leaves on one thread (below 2^16): threads wait for each other at a
+# barrier, on busy cores up to 40 ms for a product of 0.4 ms (801 wavelengths)
+_PRODUCT = 2**15
 
 
 def choose(
@@ -41,6 +46,7 @@ def choose(
     white = integrand(FINE_STEP_NM)
     if len(white.lambda_nm) == 1:
         return uniform(white, len(rho))
+    usual = _usual(white.lambda_nm[0], white.lambda_nm[-1], rho, sigma_um)
     steps = (_scaled_to(white, integrand(step)) for step in _STEPS_NM)
     coarse = next(steps)
     x = np.linspace(0.0, _REACH_SIGMAS * sigma_um, _POINTS)
@@ -56,7 +62,7 @@ def choose(
         chosen[open_[left <= tolerance]] = len(rules) - 1
         open_ = open_[left > tolerance]
         if not len(open_):
-            return _assemble(rules, chosen)
+            return _assemble(rules, chosen, usual)
         rules.append(finer)
         response = response_finer
     raise AccuracyError(
@@ -72,17 +78,27 @@ def expected(light: Light, rho: Array, sigma_um: float) -> RingQuadratures:
     Returns evenly spaced wavelengths without weights.
     """
     if light.is_line:
-        return RingQuadratures(
-            1e-3 * np.array([light.lambda_min_nm]), np.zeros((1, 3)), np.zeros(len(rho), int), np.ones(len(rho), int)
-        )
+        return uniform(Quadrature(np.array([light.lambda_min_nm]), np.zeros((1, 3))), len(rho))
     low, high = light.range_nm
-    steps = np.array(_STEPS_NM)
-    needed = 1e-3 * low * high / (6.0 * sigma_um * np.maximum(rho, 1e-9))
-    index = np.minimum(np.searchsorted(-steps, -needed), len(steps) - 1)
-    lambda_um = [1e-3 * np.linspace(low, high, max(1, ceil((high - low) / step - 1e-9)) + 1) for step in steps]
-    count = np.array([len(nodes) for nodes in lambda_um])
-    first = np.cumsum(count) - count
-    return RingQuadratures(np.concatenate(lambda_um), np.zeros((count.sum(), 3)), first[index], count[index])
+    rules = [Quadrature(nodes, np.zeros((len(nodes), 3))) for nodes in _nodes(low, high)]
+    return _assemble(rules, _beats(low, high, rho, sigma_um), _usual(low, high, rho, sigma_um))
+
+
+def _nodes(low_nm: float, high_nm: float) -> list[Array]:
+    """Returns the wavelengths of every step, nm."""
+    return [np.linspace(low_nm, high_nm, max(1, ceil((high_nm - low_nm) / step - 1e-9)) + 1) for step in _STEPS_NM]
+
+
+def _beats(low_nm: float, high_nm: float, rho: Array, sigma_um: float) -> np.ndarray:
+    """Finds the step, by its index, that has six wavelengths to each beat across the window, (n_rings,)."""
+    needed = 1e-3 * low_nm * high_nm / (6.0 * sigma_um * np.maximum(rho, 1e-9))
+    return np.asarray(np.minimum(np.searchsorted(-np.array(_STEPS_NM), -needed), len(_STEPS_NM) - 1))
+
+
+def _usual(low_nm: float, high_nm: float, rho: Array, sigma_um: float) -> np.ndarray:
+    """Estimates how many wavelengths the most structured lights of a range need on every ring, (n_rings,)."""
+    index = np.maximum(_beats(low_nm, high_nm, rho, sigma_um), _STEPS_NM.index(_STEP_OF_DAYLIGHT_NM))
+    return np.asarray(np.array([len(nodes) for nodes in _nodes(low_nm, high_nm)])[index])
 
 
 def _scaled_to(white: Quadrature, rule: Quadrature) -> Quadrature:
@@ -95,7 +111,7 @@ def _scaled_to(white: Quadrature, rule: Quadrature) -> Quadrature:
 
 def uniform(rule: Quadrature, rings: int) -> RingQuadratures:
     """Assigns one quadrature to every one of `rings` rings."""
-    return _assemble([rule], np.zeros(rings, int))
+    return _assemble([rule], np.zeros(rings, int), np.full(rings, len(rule.lambda_nm)))
 
 
 def _points(y_max: float, rule: Quadrature) -> int:
@@ -114,9 +130,11 @@ def _response(rule: Quadrature, y: Array) -> Array:
     starts, within = _waves(rule, y[::run]), _waves(rule, y[:run])
     # avoid 0 / 0 for channels with almost no weight, such as Z under a red laser
     total = np.maximum(np.abs(rule.weights).sum(axis=0), 1e-3 * np.abs(rule.weights[:, 1]).sum())
-    shared = within[:, None] * (rule.weights / total).T.astype(np.float32)
-    found = starts @ shared.reshape(3 * run, -1).T
-    return np.asarray(found.reshape(-1, 3)[: len(y)])
+    shared = (within[:, None] * (rule.weights / total).T.astype(np.float32)).reshape(3 * run, -1)
+    at_once = max(1, _PRODUCT // (len(starts) * len(shared)))
+    parts = range(0, len(rule.lambda_nm), at_once)
+    found = sum(starts[:, at : at + at_once] @ shared[:, at : at + at_once].T for at in parts)
+    return np.asarray(found).reshape(-1, 3)[: len(y)]
 
 
 def _waves(rule: Quadrature, y: Array) -> NDArray[np.complex64]:
@@ -130,8 +148,11 @@ def _waves(rule: Quadrature, y: Array) -> NDArray[np.complex64]:
     return waves
 
 
-def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:
-    """Concatenates the quadratures in use; chosen: index of the quadrature of each ring (n_rings,)."""
+def _assemble(rules: list[Quadrature], chosen: np.ndarray, usual: np.ndarray) -> RingQuadratures:
+    """Concatenates the quadratures in use.
+
+    chosen: index of the quadrature of each ring (n_rings,). usual: as in `RingQuadratures`.
+    """
     used = sorted(set(chosen.tolist()))
     count = np.array([len(rules[k].lambda_nm) for k in used])
     first = np.concatenate([[0], np.cumsum(count)[:-1]])
@@ -141,4 +162,5 @@ def _assemble(rules: list[Quadrature], chosen: np.ndarray) -> RingQuadratures:
         np.concatenate([rules[k].weights for k in used]),
         first[place],
         count[place],
+        usual,
     )

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles, bands, sectors
-from pipeline.optics import geometry
-from pipeline.optics.scene import Direction, Scene
+from pipeline.scene.model import Scene
+from pipeline.scene.visited import visited
 
-# from a sample of the visited directions to the texels of its spline, which lie up to 2 away, and 1 for directions
-# between samples
-_TAPS = 3
+# from the texels beside a direction to those of its spline
+_TAPS = 2
 # texels between a look-up and the end of the samples: of the second difference there, 0.268^6 = 4e-4 remains
 MARGIN = 6
+# samples of a scene's directions
+_SAMPLES = 200_000
 
 
 @dataclass(frozen=True)
@@ -27,13 +28,10 @@ class Reach:
     """What a scene visits of a grid.
 
     texels: bool (rings, azimuths), those from which look-ups of visited directions interpolate.
-    w: the least and the largest |w| of the visited directions beside every ring, (rings, 2); NaN where there are
-        none.
     """
 
     grid: PolarGrid
     texels: NDArray[np.bool_]
-    w: Array
 
     @property
     def share(self) -> float:
@@ -50,41 +48,45 @@ class Reach:
 
 
 def reach(scene: Scene | None, grid: PolarGrid) -> Reach:
-    """Finds what the lights and the cone of views of a scene visit of a grid; without a scene, all of it."""
+    """Finds what a scene visits of a grid; without a scene, all of it. Raises the errors of `visited`."""
     if scene is None:
-        top = np.sqrt(np.maximum(4.0 - grid.rings.rho() ** 2, 0.0))
-        everything = np.ones((grid.rings.count, grid.azimuths.count), bool)
-        return Reach(grid, everything, np.stack([np.zeros_like(top), top], axis=1))
-    widest = np.sin(np.radians(scene.views.theta_max_deg))
-    uv, found = _texels_uv(grid), []
-    for light in scene.lights:
-        wi = unit_vector(light)
-        seen = uv[np.sum((wi[:2] + uv) ** 2, axis=1) <= widest**2]
-        # a narrow cone may lie between texels
-        uvs = np.concatenate([seen, -wi[None, :2]])
-        found.append(np.concatenate([uvs, -w_of(wi, uvs)[:, None]], axis=1))
-    return of_directions(grid, np.concatenate(found))
+        return Reach(grid, np.ones((grid.rings.count, grid.azimuths.count), bool))
+    found = visited(scene, _SAMPLES)
+    return of_directions(grid, found.uvw, found.gap)
 
 
-def of_directions(grid: PolarGrid, uvw: Array) -> Reach:
+def of_directions(grid: PolarGrid, uvw: Array, gap: Array | float = 0.0) -> Reach:
     """Finds what sampled directions visit of a grid.
 
-    uvw: (u, v, w) of pairs of light and view (samples, 3), at most about a texel apart.
+    uvw: (u, v, w) of pairs of light and view (samples, 3). gap: how far from each sample directions are visited
+    (samples,), as a distance in (u, v).
     """
-    rho = np.hypot(uvw[:, 0], uvw[:, 1])
-    rings, azimuths = grid.rings.count, grid.azimuths.count
-    ring = np.clip(np.rint(grid.rings.ring_from_rho(rho)).astype(int), 0, rings - 1)
-    azimuth = np.rint(grid.azimuths.azimuth_from_uv(uvw[:, :2])).astype(int) % azimuths
-    visited = np.zeros((rings, azimuths), bool)
-    visited[ring, azimuth] = True
-    if visited[0].any():
+    beside = _beside(grid, uvw[:, :2], np.broadcast_to(gap, len(uvw)))
+    if beside[0].any():
         # the first ring is one point
-        visited[0] = True
-    low, high = np.full(rings, np.inf), np.full(rings, -np.inf)
-    np.minimum.at(low, ring, np.abs(uvw[:, 2]))
-    np.maximum.at(high, ring, np.abs(uvw[:, 2]))
-    w = np.where(np.isfinite(low)[:, None], np.stack([low, high], axis=1), np.nan)
-    return Reach(grid, _grown(visited, _TAPS), w)
+        beside[0] = True
+    return Reach(grid, _grown(beside, _TAPS))
+
+
+def _beside(grid: PolarGrid, uv: Array, gap: Array) -> NDArray[np.bool_]:
+    """Marks the texels (rings, azimuths) beside all directions of discs about `uv` (samples, 2), of radius `gap`."""
+    rho, phi = np.hypot(uv[:, 0], uv[:, 1]), np.arctan2(uv[:, 1], uv[:, 0])
+    rings, azimuths = grid.rings.count, grid.azimuths.count
+    low = np.floor(grid.rings.ring_from_rho(np.maximum(rho - gap, 0.0))).astype(int).clip(max=rings - 1)
+    high = np.ceil(grid.rings.ring_from_rho(rho + gap)).astype(int).clip(max=rings - 1)
+    # the angle of half a disc as the origin sees it; every angle if it holds the origin
+    half = np.arcsin(np.divide(gap, rho, out=np.ones_like(rho), where=gap < rho))
+    start, end = (grid.azimuths.azimuth_from_uv(_unit(angle)) for angle in (phi - half, phi + half))
+    first = start.astype(int)
+    last = np.where(gap < rho, np.ceil(start + (end - start) % azimuths).astype(int), first + azimuths - 1)
+    last = np.minimum(last, first + azimuths - 1)
+    # how many rectangles a texel is in, on two turns: the sum of their corners before it
+    corners = np.zeros((rings + 1, 2 * azimuths + 1), np.int32)
+    for ring, sign in ((low, 1), (high + 1, -1)):
+        np.add.at(corners, (ring, first), sign)
+        np.add.at(corners, (ring, last + 1), -sign)
+    inside = corners.cumsum(axis=0).cumsum(axis=1)[:rings, : 2 * azimuths] > 0
+    return np.asarray(inside[:, :azimuths] | inside[:, azimuths:])
 
 
 def known_cells(tiles: Tiles) -> NDArray[np.bool_]:
@@ -94,11 +96,6 @@ def known_cells(tiles: Tiles) -> NDArray[np.bool_]:
     along each axis about it, none of which is within MARGIN of a tile that is missing.
     """
     return ~_grown(~tiles.mask(), MARGIN + 2)
-
-
-def unit_vector(light: Direction) -> Array:
-    """Returns the unit vector (3,) towards a light."""
-    return geometry.direction(*np.radians([light.theta_deg, light.phi_deg]))
 
 
 def w_of(wi: Array, uv: Array) -> Array:
@@ -126,10 +123,8 @@ def _squared_cosine(wi: Array, uv: Array) -> Array:
     return np.asarray(1.0 - np.sum((wi[:2] + uv) ** 2, axis=-1))
 
 
-def _texels_uv(grid: PolarGrid) -> Array:
-    """Computes (u, v) of all texels, (rings azimuths, 2)."""
-    phi, rho = grid.azimuths.phi(), grid.rings.rho()
-    return np.stack([np.outer(rho, np.cos(phi)), np.outer(rho, np.sin(phi))], axis=-1).reshape(-1, 2)
+def _unit(phi: Array) -> Array:
+    return np.stack([np.cos(phi), np.sin(phi)], axis=-1)
 
 
 def _grown(mask: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:

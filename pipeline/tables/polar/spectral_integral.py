@@ -1,15 +1,16 @@
-"""The spectral integral of E(r, phi, s) on rings, for a light, an observer and a reflectance.
+"""The spectral integral of E(r, phi, s) on rings, for lights, observers and reflectances.
 
 docs/spectral_operator.md derives the operator.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import spectral_operator
+from kernels.spectral_operator import LinePoints, Span
 from pipeline import resources
 from pipeline.arrays import Array
 from pipeline.optics.brdf import grey
@@ -21,6 +22,14 @@ from pipeline.tables.polar.quadrature import RingQuadratures
 Reflectance = Callable[[Array, Array], Array]
 
 
+@dataclass(frozen=True)
+class Integrand:
+    """A light with its observer and material: the wavelengths and weights of every ring, and R."""
+
+    quadratures: RingQuadratures
+    reflectance: Reflectance = grey
+
+
 def integrate(
     power: NDArray[np.float32],
     radius_per_um: Array,
@@ -30,26 +39,57 @@ def integrate(
     w_terms: int,
     reflectance: Reflectance = grey,
 ) -> NDArray[np.float32]:
-    """Integrates the power spectrum over wavelengths: XYZ / (C cos ti) = sum_l R_l |P|^2 weights.
+    """Integrates the power spectrum over wavelengths for one light: XYZ / (C cos ti) = sum_l R_l |P|^2 weights.
+
+    Returns Chebyshev coefficients (n_rings, 3, w_terms, azimuths); all else is that of `integrate_all`.
+    """
+    only = Integrand(quadratures, reflectance)
+    return integrate_all(power, radius_per_um, s_max_per_um, rho, [only], w_terms)[0]
+
+
+def integrate_all(
+    power: NDArray[np.float32],
+    radius_per_um: Array,
+    s_max_per_um: float,
+    rho: Array,
+    integrands: Sequence[Integrand],
+    w_terms: int,
+) -> list[NDArray[np.float32]]:
+    """Integrates the power spectrum over wavelengths for several lights, in one pass over E where they share points.
 
     power: float32 (tiles, n_r, s nodes, 16), the values of a `PolarPowerSpectrum`. radius_per_um: its radii (n_r,),
     1/um. s_max_per_um: end of the interval of its nodes in s, 1/um.
-    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. quadratures: their wavelengths and weights.
-    w_terms: number of Chebyshev terms in |w|, a multiple of 4. reflectance: R.
-    Returns Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths). Raises ResourceError if
-    the weights over s do not fit into memory. See docs/spectral_operator.md.
+    rho: |(u, v)| of the rings (n_rings,), ascending, dimensionless. integrands: the lights.
+    w_terms: number of Chebyshev terms in |w|, a multiple of 4.
+    Returns each light's Chebyshev coefficients in x = 2 |w| / w_max - 1, (n_rings, 3, w_terms, azimuths), the same to
+    the last bit as alone. Raises ResourceError if the weights over s do not fit into memory. See
+    docs/spectral_operator.md.
     """
-    s_nodes = power.shape[2]
-    points = line_points.choose(radius_per_um, s_nodes, s_max_per_um, rho, quadratures)
+    s_nodes, of = power.shape[2], (radius_per_um, s_max_per_um, rho)
+    points = [line_points.choose(radius_per_um, s_nodes, *of[1:], each.quadratures) for each in integrands]
     resources.require(
         "the weights of the spectral integral",
-        4 * len(points.place) * s_nodes * w_terms,
+        4 * sum(len(each.place) for each in points) * s_nodes * w_terms,
         "lower the heights (a scan's outliers: surface.clip_percentile) or raise accuracy.delta_e",
     )
-    span = spectral_operator.whole_span(rho, points)
-    reflected = at_nodes(reflectance, rho, spectral_operator.group_w(points, span, w_terms), quadratures)
-    terms = spectral_operator.integrate(power, radius_per_um, s_max_per_um, rho, points, quadratures, reflected)
-    return terms.reshape(len(rho), 3, w_terms, -1)
+    spans = [spectral_operator.whole_span(rho, each) for each in points]
+    lights = [on_rings(rho, *each, w_terms) for each in zip(points, spans, integrands, strict=True)]
+    found, at_once = [], spectral_operator.most_lights(w_terms)
+    for first in range(0, len(lights), at_once):
+        found += [*spectral_operator.integrate(power, *of, lights[first : first + at_once])]
+    return [terms.reshape(len(rho), 3, w_terms, -1) for terms in found]
+
+
+def on_rings(
+    rho: Array, points: LinePoints, span: Span, integrand: Integrand, w_terms: int
+) -> spectral_operator.RingIntegrals:
+    """Computes a light's reflectance where the rings take E.
+
+    rho: |(u, v)| of the rings (n_rings,). points: of these rings. span: of the nodes in |w|. w_terms: their number.
+    """
+    w = spectral_operator.group_w(points, span, w_terms)
+    reflected = _at_nodes(integrand.reflectance, rho, w, integrand.quadratures)
+    return spectral_operator.RingIntegrals(points, span, integrand.quadratures, reflected)
 
 
 @dataclass(frozen=True)
@@ -118,7 +158,7 @@ def size(
     return IntegralSize(*counts, wavelengths, longest, len(rho), s_nodes, w_terms, azimuths)
 
 
-def at_nodes(reflectance: Reflectance, rho: Array, w: Array, quadratures: RingQuadratures) -> NDArray[np.float32]:
+def _at_nodes(reflectance: Reflectance, rho: Array, w: Array, quadratures: RingQuadratures) -> NDArray[np.float32]:
     """Computes the reflectance at the wavelengths and the nodes in w of every ring.
 
     (u, v, w) = -wi - wr, so cos(half angle) = sqrt(rho^2 + w^2) / 2.

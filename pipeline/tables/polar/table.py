@@ -6,6 +6,7 @@ where `table` is interpolated by bicubic B-splines. |w| <= w_max on a ring, beca
 vectors.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +14,13 @@ from numpy.typing import NDArray
 
 from kernels import cubic_spline
 from kernels.chebyshev import w_max
-from kernels.spectral_operator import RingQuadratures
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
-from pipeline.optics.brdf import Radiometry, geometry_factor, grey
+from pipeline.optics.brdf import Radiometry, geometry_factor
 from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
-from pipeline.tables.polar.spectral_integral import Reflectance
+from pipeline.tables.polar.spectral_integral import Integrand
 
 # at the rim both |w| and w_max vanish: the divisor must exceed the rounding of 4 - rho^2 in the float32 of shaders
 _LEAST_W_MAX = 1e-3
@@ -75,24 +75,19 @@ class PolarTable:
         return radiometry.direction_factor(wi, wr)
 
 
-def build(
-    power: PolarPowerSpectrum,
-    rings: Rings,
-    quadratures: RingQuadratures,
-    w_terms: int,
-    reflectance: Reflectance = grey,
-) -> PolarTable:
-    """Makes a table from a power spectrum.
+def build(power: PolarPowerSpectrum, rings: Rings, integrands: Sequence[Integrand], w_terms: int) -> list[PolarTable]:
+    """Makes the tables of several lights from a power spectrum, in one pass over it.
 
-    power: E. rings: those of the table. quadratures: wavelengths and weights of light and observer on every ring.
-    w_terms: number of Chebyshev terms in |w|. reflectance: R inside the integral.
+    power: E. rings: those of the tables. integrands: each light's wavelengths, weights and R on every ring.
+    w_terms: number of Chebyshev terms in |w|.
     Raises ResourceError if the spectral integral does not fit into memory.
     """
-    rho = rings.rho()
-    of = power.values, power.radius_per_um, power.s_max_per_um
-    samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
-    values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
-    return PolarTable(values, PolarGrid(rings, power.azimuths))
+    of = power.values, power.radius_per_um, power.s_max_per_um, rings.rho()
+    tables = []
+    for samples in spectral_integral.integrate_all(*of, integrands, w_terms):
+        values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
+        tables.append(PolarTable(values, PolarGrid(rings, power.azimuths)))
+    return tables
 
 
 def w_position(rho: Array, w: Array) -> Array:

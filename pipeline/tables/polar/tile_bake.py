@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kernels import cubic_spline, spectral_operator
 from kernels.programs import LANES, ORDER
-from kernels.spectral_operator import LinePoints, RingQuadratures, Span
+from kernels.spectral_operator import LinePoints, RingIntegrals, RingQuadratures, Span
 from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
@@ -27,7 +27,7 @@ from pipeline.surface.windows import MIDDLE, Places
 from pipeline.tables.polar import line_points
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.reach import known_cells, smooth_w_of, w_of
-from pipeline.tables.polar.spectral_integral import at_nodes
+from pipeline.tables.polar.spectral_integral import Integrand, on_rings
 from pipeline.tables.polar.table import w_position
 
 _VECTORS = AZIMUTHS // LANES  # of a sector
@@ -155,10 +155,9 @@ class TileBake:
 
     def _polynomials(self, of: "_Band") -> NDArray[np.float32]:
         """Computes the Chebyshev terms in |w| (n_rings, 3 w terms, azimuths)."""
-        span = spectral_operator.whole_span(of.rho, of.points)
-        reflected = self._reflected(of, span, self.bake.w_terms)
-        line = of.radius, of.s_max, of.rho, of.points, of.rules
-        return spectral_operator.integrate(of.values, *line, reflected, of.pairs)
+        light = self._on_rings(of, spectral_operator.whole_span(of.rho, of.points), self.bake.w_terms)
+        (found,) = spectral_operator.integrate(of.values, of.radius, of.s_max, of.rho, [light], of.pairs)
+        return np.asarray(found)
 
     def _values(self, of: "_Band", wi: Array, azimuths: NDArray[np.intp]) -> NDArray[np.float32]:
         """Computes X, Y and Z, or Y alone, at |w| of the light (n_rings, channels, azimuths); azimuths: by index."""
@@ -167,14 +166,14 @@ class TileBake:
         # over the whole turn, so that nodes do not depend on the tiles that are baked
         w = smooth_w_of(wi, uv, self.grid.rings.step)
         span = _span(w, of.points)
-        reflected = self._reflected(of, span, self.w_terms(0.5 * float(np.max(span.high - span.low))))
-        line = of.radius, of.s_max, of.rho, of.points, of.rules
-        xyz = spectral_operator.integrate_at(of.values, of.pairs, *line, reflected, span, w[:, azimuths])
-        return xyz[:, 1:2] if self._is_luminance else xyz
+        light = self._on_rings(of, span, self.w_terms(0.5 * float(np.max(span.high - span.low))))
+        found = spectral_operator.integrate_at(
+            of.values, of.radius, of.s_max, of.rho, light, of.pairs, w[:, azimuths]
+        )
+        return found[:, 1:2] if self._is_luminance else found
 
-    def _reflected(self, of: "_Band", span: Span, w_terms: int) -> NDArray[np.float32]:
-        within = spectral_operator.group_w(of.points, span, w_terms)
-        return at_nodes(self.bake.radiometry.reflectance, of.rho, within, of.rules)
+    def _on_rings(self, of: "_Band", span: Span, w_terms: int) -> RingIntegrals:
+        return on_rings(of.rho, of.points, span, Integrand(of.rules, self.bake.radiometry.reflectance), w_terms)
 
 
 @dataclass(frozen=True)
@@ -290,7 +289,8 @@ def _paired(vectors: NDArray[np.intp], half: int) -> NDArray[np.intp]:
 
 
 def _of_rings(rules: RingQuadratures, rings: NDArray[np.intp]) -> RingQuadratures:
-    return RingQuadratures(rules.lambda_um, rules.weights, rules.first[rings], rules.count[rings])
+    of_rings = rules.first[rings], rules.count[rings], rules.usual[rings]
+    return RingQuadratures(rules.lambda_um, rules.weights, *of_rings)
 
 
 def _span(w: Array, points: LinePoints) -> Span:

@@ -11,11 +11,11 @@ from pipeline import resources
 from pipeline.arrays import Array
 from pipeline.diffraction.dft_stack import Stack, StackSize
 from pipeline.diffraction.upload import upload
-from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import Quadrature
-from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
+from pipeline.scene.model import Scene
+from pipeline.scene.visited import discs
 from pipeline.tables.taylor import grid
 
 
@@ -188,17 +188,11 @@ def seconds(nodes: int, wavelengths: int, terms: int, coefficients: StackSize) -
 def reachable_nodes(u: Array, scene: Scene | None) -> NDArray[np.bool_]:
     """Finds the nodes at the corners of the grid cells that a pair of directions reaches, bool (v, u).
 
-    (u, v) lies in the disc of radius 2; under a fixed light, in the disc of radius sin(theta_max) about -wi.
+    (u, v) lies in discs, `pipeline.scene.visited.discs`.
     """
-    if scene is None:
-        discs = [((0.0, 0.0), grid.U_MAX)]
-    else:
-        reach = float(np.sin(np.radians(scene.views.theta_max_deg)))
-        centres = (-geometry.direction(np.radians(s.theta_deg), np.radians(s.phi_deg)) for s in scene.lights)
-        discs = [((float(c[0]), float(c[1])), reach) for c in centres]
     nodes = np.zeros((len(u), len(u)), dtype=bool)
     low, high = u[:-1], u[1:]
-    for (cx, cy), radius in discs:
+    for (cx, cy), radius in discs(scene):
         # offset from the disc's centre to the nearest point of each cell
         dx, dy = np.clip(cx, low, high) - cx, np.clip(cy, low, high) - cy
         cells = np.hypot(dx[None, :], dy[:, None]) <= radius

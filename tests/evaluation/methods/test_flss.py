@@ -10,7 +10,7 @@ from pipeline.evaluation.methods.dft_terms import FOUR_SIGMA, FULL, THREE_BY_THR
 from pipeline.evaluation.methods.flss import Flss
 from pipeline.evaluation.methods.method import PUBLISHED_STEP_NM, Monochromatic
 from pipeline.optics import geometry
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.surface.heightfield import HeightField
 from tests.evaluation.methods.surfaces import ELAPHE, SIGMA, config, made
 

@@ -11,7 +11,7 @@ from pipeline.evaluation.methods.nmm import Nmm, landing
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import sigma_f
 from pipeline.optics.light import trapezoid
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from tests.evaluation.methods.surfaces import ELAPHE, SIGMA, config, made
 
 RANGE = (380.0, 780.0)

@@ -1,7 +1,8 @@
 """The search for the smallest polar grid that keeps an error budget.
 
-The errors of three tables at test directions give the coefficients of e^2 = a / rings^4 + b / azimuths^4 + c. The
-search minimises rings times azimuths under this model and measures the error of the grids that it proposes.
+The errors of three tables at test directions give the coefficients of e^2 = a / rings^8 + b / azimuths^8 + c: cubic
+splines err by the fourth power of the distance of their knots. The search minimises rings times azimuths under this
+model and measures the error of the grids that it proposes.
 """
 
 from functools import cached_property
@@ -12,14 +13,14 @@ import numpy as np
 from pipeline import resources
 from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
 from pipeline.optics.coherence import FLANK_DELTA_E, lobe_width
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
 from pipeline.tables.polar.planning.anisotropy import anisotropy
 from pipeline.tables.polar.planning.probes import FlankProbes, Probes
 from pipeline.tables.polar.planning.trial import Trial
 
-_GRID_SHARE = 0.65  # share of the budget for the error at the test directions
+GRID_SHARE = 0.65  # share of the budget for the error at the test directions
 # start of the search: the grid that keeps a dE of 0.1 on snake scans with sigma = 16.25 um
 _BASE_SIGMA_UM, _BASE_DELTA_E, _BASE_AZIMUTHS, _BASE_RING_STEP, _BASE_R0 = 16.25, 0.1, 1792, 0.0253, 0.12
 # distances of the innermost rings among which the search chooses, in widths of the specular lobe at the shortest
@@ -28,6 +29,7 @@ _DISTANCES = (0.82, 0.65, 0.5, 0.42, 0.35, 0.3, 0.25)
 _FLANK_SHARE = 0.65
 _LEAST_SHARE_OF_R0 = 1.0 / 6.0
 _LEAST_RINGS, _LEAST_AZIMUTHS, _MOST_RINGS, _MOST_AZIMUTHS = 24, 128, 4096, 32768
+_POWER = 8  # of the knots' distance in the squared error of cubic splines
 _ROUNDS = 6
 _HALVINGS = 40
 _GROWTH = 1.5
@@ -168,7 +170,7 @@ class GridSearch:
 
         rings, azimuths: where the search starts. Returns both numbers and the error at the test directions.
         """
-        target = _GRID_SHARE * self._delta_e
+        target = GRID_SHARE * self._delta_e
         errors = {}
 
         def error(r: int, a: int) -> float:
@@ -176,23 +178,26 @@ class GridSearch:
                 errors[r, a] = self._error(r, a)
             return errors[r, a]
 
-        # e^2 = by_rings / rings^4 + by_azimuths / azimuths^4 + rest, from three tables
+        # e^2 = by_rings / rings^8 + by_azimuths / azimuths^8 + rest, from three tables
         here = error(rings, azimuths) ** 2
         other_rings = _other(rings, 3 * rings // 4)
         other_azimuths = _other(azimuths, _whole_tiles(3 * azimuths // 4))
         by_rings = _share(error(other_rings, azimuths) ** 2 - here, other_rings, rings)
         by_azimuths = _share(error(rings, other_azimuths) ** 2 - here, other_azimuths, azimuths)
-        rest = max(here - by_rings * rings**-4.0 - by_azimuths * azimuths**-4.0, 0.0)
+        rest = max(here - by_rings * float(rings) ** -_POWER - by_azimuths * float(azimuths) ** -_POWER, 0.0)
         left = max(target**2 - rest, 0.25 * target**2)
-        best = rings, azimuths
+        best, proposed = (rings, azimuths), set[tuple[int, int]]()
         for _ in range(_ROUNDS):
             before, best = (
                 best,
-                self._grids.clipped((2.0 * by_rings / left) ** 0.25, (2.0 * by_azimuths / left) ** 0.25),
+                self._grids.clipped(*((2.0 * by / left) ** (1.0 / _POWER) for by in (by_rings, by_azimuths))),
             )
             if errors.get(best, 0.0) > target:
                 # the model proposes a grid known to miss the target; a coarse grid can have a low error by chance
+                if any(errors[pair] <= target for pair in proposed):
+                    break
                 best = self._grids.clipped(_GROWTH * before[0], _GROWTH * before[1])
+            proposed.add(best)
             if _NEAR * target <= error(*best) <= target:
                 break
             # no error at all, where every test direction saturates or is black, asks for the coarsest grid
@@ -225,8 +230,8 @@ def _other(count: int, coarser: int) -> int:
 
 
 def _share(growth: float, other: int, here: int) -> float:
-    """Computes the coefficient c of a squared error c / n^4 that grows by `growth` from n = here to n = other."""
-    return float(max(growth / (other**-4.0 - here**-4.0), 0.0))
+    """Computes the coefficient c of a squared error c / n^8 that grows by `growth` from n = here to n = other."""
+    return float(max(growth / (float(other) ** -_POWER - float(here) ** -_POWER), 0.0))
 
 
 def _whole_tiles(azimuths: int) -> int:

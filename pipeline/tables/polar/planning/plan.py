@@ -7,15 +7,14 @@ exponential (Jacobi-Anger expansion). The grid depends on the surface and is sea
 from dataclasses import dataclass
 from math import ceil
 
-import numpy as np
-
 from pipeline.diffraction import expansion, power_spectrum
-from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, Rings
+from pipeline.diffraction.polar_grid import Azimuths, Rings
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
-from pipeline.optics.scene import Scene
 from pipeline.progress import Progress, silent
+from pipeline.scene.model import Scene
+from pipeline.scene.visited import rho_max
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
 from pipeline.tables.polar.bake import PolarBake
@@ -30,6 +29,8 @@ _W_SHARE, _W_SHARE_OF_A_LINE = 0.3, 0.1  # of the table, by its terms in |w|, fo
 # of the spectral integral, by its wavelengths. A quarter of the share costs 5 % of a table's time and lowers its mean
 # error by 5 %; below the limit other errors are larger
 _QUADRATURE_SHARE, _QUADRATURE_LIMIT = 3e-3, 3e-5
+# grey, so that one plan serves every material
+MATERIAL = Material(normalisation="relative")
 
 
 @dataclass(frozen=True)
@@ -86,14 +87,6 @@ class Plan:
         )
 
 
-def rho_max(scene: Scene | None) -> float:
-    """Computes the largest |(u, v)| of a scene, sin(theta_i) + sin(theta_r); 2 without a scene."""
-    if scene is None:
-        return RHO_MAX
-    view = np.sin(np.radians(scene.views.theta_max_deg))
-    return float(min(RHO_MAX, max(np.sin(np.radians(light.theta_deg)) for light in scene.lights) + view))
-
-
 def start(
     field: HeightField,
     places: Places,
@@ -129,7 +122,7 @@ def numbers(
     amplitude = AMPLITUDE_SHARE * budget.delta_e
     z_luminous = z * lambda_min / probing.middle_nm
     return PolarBake(
-        radiometry=Radiometry(probing, Material(normalisation="relative"), sigma_um),
+        radiometry=Radiometry(probing, MATERIAL, sigma_um),
         lambda_min_nm=lambda_min,
         rho_max=rho_max(scene),
         spacing=_spacing(probing),

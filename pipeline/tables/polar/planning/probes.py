@@ -13,8 +13,8 @@ from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_RU, FLANK_WIDTHS, lobe_width
 from pipeline.optics.colour import delta_e
-from pipeline.optics.random_directions import flank_pairs, random_pairs
-from pipeline.optics.scene import Scene
+from pipeline.scene.model import Scene
+from pipeline.scene.pairs import flank_pairs, random_pairs
 from pipeline.tables.polar import spectral_integral
 from pipeline.tables.polar import table as polar
 from pipeline.tables.polar.bake import PolarBake
