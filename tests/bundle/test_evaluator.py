@@ -16,6 +16,7 @@ from pipeline.bundle.polar import look_up
 from pipeline.bundle.polar.prepare import grid_entry
 from pipeline.bundle.verify import open_bundle
 from pipeline.config.models import Config
+from pipeline.diffraction import tiles
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.optics import brdf, geometry
 from pipeline.optics.light import trapezoid
@@ -71,7 +72,7 @@ def test_a_table_without_symmetry_is_looked_up_equally() -> None:
     """Noise on a turned and stretched grid tests every rule of the grid, at its origin and its rim as well."""
     rng = np.random.default_rng(5)
     values = rng.normal(size=(24, 3, 4, 96)).astype(np.float32)
-    table = PolarTable(values, PolarGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4)))
+    table = PolarTable(values, tiles.whole(PolarGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4))))
     rho, phi = 2.0 * np.sqrt(rng.random(5000)), 2.0 * np.pi * rng.random(5000)
     rho[:500], rho[500:1000] = 0.1 * rng.random(500), 2.0 - 0.1 * rng.random(500)
     w = -np.sqrt(4.0 - rho**2) * rng.random(5000)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.tiles import Tiles
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.polar import certificate, power_spectrum
@@ -60,6 +61,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "layout": "polar",
         "rings": asdict(table.grid.rings),
         "azimuths": asdict(table.grid.azimuths),
+        "tiles": {"covered": table.tiles.covered.tolist(), "every": list(table.tiles.every)},
+        "texels": table.tiles.texels,
         "w_terms": table.w_terms,
         "wavelengths": int(rules.count.max()),
         "wavelengths_mean": float(rules.count.mean()),
@@ -77,13 +80,14 @@ def of(inputs: Inputs) -> polar.PolarTable:
 
 def load(artifact: Artifact) -> polar.PolarTable:
     """Reads the table of an artifact of this stage."""
-    return polar.PolarTable(arrays.load(artifact.folder / _FILE, "table"), grid_of(artifact))
+    return polar.PolarTable(arrays.load(artifact.folder / _FILE, "table"), tiles_of(artifact))
 
 
-def grid_of(artifact: Artifact) -> PolarGrid:
-    """Returns the grid in the record of an artifact of this stage."""
+def tiles_of(artifact: Artifact) -> Tiles:
+    """Returns the tiles in the record of an artifact of this stage."""
     found = artifact.summary
-    return PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
+    grid = PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
+    return Tiles(grid, np.array(found["tiles"]["covered"], bool), tuple(found["tiles"]["every"]))
 
 
 def _work(config: Config) -> str:
@@ -91,4 +95,4 @@ def _work(config: Config) -> str:
     return f"{layout.rings} rings x {layout.azimuths} azimuths"
 
 
-TABLE = Stage("table", 7, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)
+TABLE = Stage("table", 8, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)

@@ -95,8 +95,8 @@ def _load(inputs: Inputs) -> "Stored":
     zarr = inputs["textures"].folder / _FILE
     values, scale, basis = (arrays.load(zarr, name) for name in ("texels", "scale", "basis"))
     envelope = Envelope(**arrays.attributes(zarr)["envelope"])
-    found = Textures(values.astype(np.float32), basis, table.grid_of(inputs["table"]), envelope)
+    found = Textures(values.astype(np.float32), basis, table.tiles_of(inputs["table"]), envelope)
     return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
 
 
-TEXTURES = Stage("textures", 2, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)
+TEXTURES = Stage("textures", 3, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

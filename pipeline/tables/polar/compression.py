@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from kernels import cubic_spline
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
+from pipeline.diffraction.tiles import Tiles
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.random_directions import random_pairs
@@ -67,13 +68,18 @@ class Textures:
     """A polar table as textures of spline coefficients; look-ups are multiplied by the basis and the envelope.
 
     values: float32 (rings, outputs, azimuths), outputs a multiple of 4. basis: (outputs, 3, w terms).
-    grid: the rings and azimuths. envelope: g(rho).
+    tiles: as those of a polar table. envelope: g(rho).
     """
 
     values: NDArray[np.float32]
     basis: Array
-    grid: PolarGrid
+    tiles: Tiles
     envelope: Envelope = Envelope()
+
+    @property
+    def grid(self) -> PolarGrid:
+        """The rings and azimuths."""
+        return self.tiles.grid
 
     @property
     def count(self) -> int:
@@ -102,7 +108,7 @@ class Textures:
         outputs, _, terms = self.basis.shape
         flat = self.basis.reshape(outputs, -1).T.astype(np.float32)
         rings, _, azimuths = self.values.shape
-        return PolarTable(np.matmul(flat, self.values).reshape(rings, 3, terms, azimuths), self.grid)
+        return PolarTable(np.matmul(flat, self.values).reshape(rings, 3, terms, azimuths), self.tiles)
 
 
 def most_textures(table: PolarTable) -> int:
@@ -115,7 +121,7 @@ def whole(table: PolarTable) -> Textures:
     rings, channels, terms, azimuths = table.values.shape
     outputs = channels * terms
     values = table.values.reshape(rings, outputs, azimuths)
-    return Textures(values, np.eye(outputs).reshape(outputs, channels, terms), table.grid)
+    return Textures(values, np.eye(outputs).reshape(outputs, channels, terms), table.tiles)
 
 
 def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
@@ -136,7 +142,7 @@ def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
     kept = _components(moments, metric @ _mirror_texel(full), outputs)
     project = (kept.T @ metric).astype(np.float32)
     basis = np.asarray(np.linalg.solve(metric, kept).T.reshape(outputs, 3, table.w_terms))
-    return Textures(np.matmul(project, full.values), basis, table.grid)
+    return Textures(np.matmul(project, full.values), basis, table.tiles)
 
 
 def _mirror_texel(textures: Textures) -> Array:
@@ -189,7 +195,8 @@ def flattened(textures: Textures) -> Textures:
     """Divides textures by the envelope that fits them best, which narrows their range for half floats."""
     rho, nodes = textures.grid.rings.rho(), samples(textures.values)
     envelope = _fit(rho, nodes)
-    values = cubic_spline.coefficients(nodes / envelope.at(rho).astype(np.float32)[:, None, None])
+    flat = nodes / envelope.at(rho).astype(np.float32)[:, None, None]
+    values = cubic_spline.coefficients(flat, textures.tiles.every_of_ring)
     return replace(textures, values=values, envelope=envelope)
 
 

@@ -3,7 +3,8 @@
 XYZ / (C cos ti) = sum_k T_k(2 |w| / w_max - 1) table[ring, channel, k, azimuth],   w_max = sqrt(4 - rho^2)
 
 where `table` is interpolated by bicubic B-splines. |w| <= w_max on a ring, because -(u, v, w) is the sum of two unit
-vectors.
+vectors. Near the mirror direction a ring's spline has its knots at every second or fourth azimuth; in memory it is
+refined to all of them, and a bundle stores the coefficients that it is made from.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from kernels.spectral_operator import RingQuadratures
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.diffraction.tiles import Tiles, thinned
 from pipeline.optics.brdf import Radiometry, geometry_factor, grey
 from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
@@ -33,11 +35,16 @@ class PolarTable:
     """B-spline coefficients on a polar grid.
 
     values: float32 (rings, 3, w terms, azimuths): X, Y, Z and Chebyshev terms in |w|.
-    grid: the rings and azimuths.
+    tiles: of the grid, those that hold values, and the azimuths at which their splines have knots.
     """
 
     values: NDArray[np.float32]
-    grid: PolarGrid
+    tiles: Tiles
+
+    @property
+    def grid(self) -> PolarGrid:
+        """The rings and azimuths."""
+        return self.tiles.grid
 
     @property
     def nbytes(self) -> int:
@@ -91,8 +98,9 @@ def build(
     rho = rings.rho()
     of = power.values, power.radius_per_um, power.s_max_per_um
     samples = spectral_integral.integrate(*of, rho, quadratures, w_terms, reflectance)
-    values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
-    return PolarTable(values, PolarGrid(rings, power.azimuths))
+    tiles = thinned(PolarGrid(rings, power.azimuths))
+    values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1), tiles.every_of_ring)
+    return PolarTable(values.reshape(samples.shape), tiles)
 
 
 def w_position(rho: Array, w: Array) -> Array:

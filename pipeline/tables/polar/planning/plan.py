@@ -10,7 +10,8 @@ from math import ceil
 import numpy as np
 
 from pipeline.diffraction import expansion, power_spectrum
-from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, Rings
+from pipeline.diffraction.polar_grid import RHO_MAX, Azimuths, PolarGrid, Rings
+from pipeline.diffraction.tiles import thinned
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
@@ -65,7 +66,7 @@ class Plan:
     @property
     def texels(self) -> int:
         """Number of texels of one output of the table."""
-        return self.rings.count * self.azimuths.count
+        return thinned(PolarGrid(self.rings, self.azimuths)).texels
 
     def bake(self, radiometry: Radiometry, budget: Budget, layout: PolarLayout) -> PolarBake:
         """Makes the settings of a bake by this plan.
