@@ -17,6 +17,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
 
 RINGS, AZIMUTHS = 16, 128
@@ -52,6 +53,28 @@ class Tiles:
         """Marks the texels of covered tiles, (rings, azimuths)."""
         by_ring = np.repeat(self.covered, RINGS, axis=0)[: self.grid.rings.count]
         return np.repeat(by_ring, AZIMUTHS, axis=1)[:, : self.grid.azimuths.count]
+
+    def covers(self, ring: Array, azimuth: Array) -> NDArray[np.bool_]:
+        """Tells where all 4 x 4 coefficients of a cubic spline lie in covered tiles, (directions,).
+
+        ring, azimuth: fractional indices (directions,) in [0, rings - 1] and [0, azimuths).
+        """
+        last, azimuths = self.grid.rings.count - 1, self.grid.azimuths.count
+        found = np.ones(len(ring), bool)
+        for row in np.floor(ring).astype(int) + np.arange(-1, 3)[:, None]:
+            # beyond the origin the opposite half turn, mirrored at the last ring
+            mirrored = last - np.abs(last - np.abs(row))
+            every, opposite = self.every_of_ring[mirrored], np.where(row < 0, azimuths // 2, 0)
+            knot = np.floor(azimuth / every).astype(int)
+            # four columns lie in two tiles at most
+            for column in (knot - 1, knot + 2):
+                found &= self.covered[mirrored // RINGS, (column * every + opposite) % azimuths // AZIMUTHS]
+        return found
+
+    def covered_share(self) -> float:
+        """Computes the share of the disc of (u, v) up to the last ring whose texels are in covered tiles."""
+        area = self.grid.area()
+        return float(np.sum(area[self.mask()]) / np.sum(area))
 
 
 def bands(grid: PolarGrid) -> int:

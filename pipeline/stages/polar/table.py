@@ -67,7 +67,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "wavelengths": int(rules.count.max()),
         "wavelengths_mean": float(rules.count.mean()),
         "unknown_share": unknown,
-        "skipped_share": 1.0 - (table.grid.rings.rho_max / 2.0) ** 2,
+        "skipped_share": 1.0 - table.tiles.covered_share() * (table.grid.rings.rho_max / 2.0) ** 2,
         "certificate": asdict(certified),
         "spectral_error": None if spectral is None else asdict(spectral),
     }

@@ -57,19 +57,15 @@ class PolarTable:
         return int(self.values.shape[2])
 
     def look_up(self, uvw: Array) -> Array:
-        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the rings."""
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the covered tiles."""
         rings, azimuths = self.grid.rings, self.grid.azimuths
         rho = np.hypot(uvw[:, 0], uvw[:, 1])
-        ring = rings.ring_from_rho(rho)
-        inside = rho <= rings.rho_max * _RIM
-        place = (
-            np.clip(ring, 0.0, rings.count - 1.0),
-            azimuths.azimuth_from_uv(uvw[:, :2]),
-            w_position(rho, uvw[:, 2]),
-        )
+        ring = np.clip(rings.ring_from_rho(rho), 0.0, rings.count - 1.0)
+        azimuth = azimuths.azimuth_from_uv(uvw[:, :2])
+        covered = (rho <= rings.rho_max * _RIM) & self.tiles.covers(ring, azimuth)
         flat = self.values.reshape(rings.count, -1, azimuths.count)
-        found = cubic_spline.look_up(flat, *place).astype(np.float64)
-        found[~inside] = np.nan
+        found = cubic_spline.look_up(flat, ring, azimuth, w_position(rho, uvw[:, 2])).astype(np.float64)
+        found[~covered] = np.nan
         return found
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
@@ -117,8 +113,7 @@ def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quad
     grid: the rings and azimuths over whose disc the share is taken. band_per_um: the Nyquist limits (x, y), 1/um.
     light: wavelengths and weights, of which those of Y count.
     """
-    rho, phi = grid.rings.rho(), grid.azimuths.phi()
-    area = np.outer(rho * np.gradient(rho), np.abs(np.gradient(np.unwrap(phi))))
+    rho, phi, area = grid.rings.rho(), grid.azimuths.phi(), grid.area()
     # along each azimuth the Nyquist limit is r = reach, so wavelengths shorter than rho / reach are lost
     reach = np.minimum(
         band_per_um[0] / np.maximum(np.abs(np.cos(phi)), 1e-12),
