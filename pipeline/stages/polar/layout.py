@@ -33,7 +33,7 @@ def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
     return [
         ["Chebyshev terms, nodes in s", f"{power_spectrum['terms']}, {power_spectrum['s_nodes']}"],
         ["windows, speckle contrast", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
-        ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
+        ["rings × azimuths, texels kept", f"{rings['count']} × {azimuths['count']}, {table['texels']}"],
         ["rings evenly spaced below ρ =", f"{rings['r0']:.3g}"],
         [
             "azimuths denser by, around",
