@@ -7,7 +7,7 @@ from pipeline.accuracy.shared import SharedReference
 from pipeline.diffraction.reference import Reference
 from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
-from pipeline.optics.random_directions import random_pairs
+from pipeline.scene.pairs import random_pairs
 from pipeline.surface.heightfield import HeightField
 
 RANGE = (540.0, 560.0)
