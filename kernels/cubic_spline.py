@@ -10,13 +10,19 @@ from kernels.polar_power_spectrum import LANES
 from kernels.windowed_dft import fourth_column
 
 
-def coefficients(table: np.ndarray) -> np.ndarray:
-    """Cubic B-spline coefficients of a table (rings, outputs, azimuths) of samples, in its place."""
+def coefficients(table: np.ndarray, every: np.ndarray | None = None) -> np.ndarray:
+    """Cubic B-spline coefficients of a table (rings, outputs, azimuths) of samples, in its place.
+
+    `every` (rings,) is 1, 2 or 4 azimuths from knot to knot of a ring, None for 1. The coefficients are those on all
+    azimuths in any case: of the same splines, with knots inserted.
+    """
     rings, outputs, azimuths = table.shape
+    every = np.ones(rings, np.int32) if every is None else every.astype(np.int32)
+    assert not np.any(azimuths % (LANES * every))
     program = programs.polar()
     buffer = device.shared(table)
-    program.launch("filter_azimuths", (outputs, rings), buffer, np.int32(azimuths))
     program.launch("filter_rings", (azimuths // (2 * LANES), outputs), buffer, np.int32(rings))
+    program.launch("filter_azimuths", (outputs, rings), buffer, np.int32(azimuths), device.upload(every))
     return device.settle(buffer, table)
 
 

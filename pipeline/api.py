@@ -153,8 +153,8 @@ class Bundle:
             them may be a single direction, (3,).
 
         Returns linear CIE XYZ (n, 3), in the unit that `manifest["units"]["XYZ"]` states: a BRDF times
-        cos(theta_i), 1/sr, or RU. It is 0 at and below the horizon, and for directions outside the [scene] for which
-        the bundle was baked; it is never negative.
+        cos(theta_i), 1/sr, or RU. It is 0 at and below the horizon and never negative; NaN for directions outside the
+        [scene] for which the bundle was baked.
 
         Raises ValueError for other shapes, and for vectors that are not of length 1.
         """

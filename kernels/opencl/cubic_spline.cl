@@ -7,17 +7,20 @@
  * Rings go on below the first, which is one point, as the opposite half turn: (-i, a) = (i, a + azimuths / 2);
  * beyond the last they are mirrored. Azimuths are periodic.
  *
- * filter_azimuths: coefficients around the turn, in place; one work-item, one output and ring. filter_rings: across the
- * rings, in place; one work-item, LANES azimuths of half a turn and those opposite, one output. look_up: values between
- * samples; one work-item, one direction. Arguments:
- *
- * filter_azimuths
- *   table     float[rings][outputs][azimuths]   1   samples, then coefficients; azimuths is a multiple of 2 LANES
- *   azimuths  int                               1   of a ring
+ * filter_rings: coefficients across the rings, in place; one work-item, LANES azimuths of half a turn and those
+ * opposite, one output. filter_azimuths: around the turn, in place; one work-item, one output and ring. A ring may have
+ * its knots at every second or fourth azimuth: the spline goes through its samples there, and knots are inserted between
+ * them, c_(2j) = (c_(j-1) + 6 c_j + c_(j+1)) / 8, c_(2j+1) = (c_j + c_(j+1)) / 2, which leaves it as it is. look_up:
+ * values between samples; one work-item, one direction. Arguments:
  *
  * filter_rings
- *   table     float[rings][outputs][azimuths]   1   coefficients around the turn, then of both axes
+ *   table     float[rings][outputs][azimuths]   1   samples, then coefficients across; azimuths is a multiple of 2 LANES
  *   rings     int                               1   of the table
+ *
+ * filter_azimuths
+ *   table     float[rings][outputs][azimuths]   1   coefficients across the rings, then of both axes
+ *   azimuths  int                               1   of a ring
+ *   every     int[rings]                        1   azimuths from knot to knot: 1, 2 or 4
  *
  * look_up
  *   table     float[rings][CHANNELS][w_terms][azimuths]   1   coefficients
@@ -61,10 +64,38 @@ FACTOR(factor_2, (float16)(a.sef, x.s01234567, x.s89ab, x.scd), (float16)(x.s23,
 FACTOR(factor_4, (float16)(a.scdef, x.s01234567, x.s89ab), (float16)(x.s4567, x.s89abcdef, b.s0123), Z4)
 FACTOR(factor_8, (float16)(a.hi, x.lo), (float16)(x.hi, b.lo), Z8)
 
+/* Every second number of a row, the first of them kept, in its first half. */
+static void halve(__global float *row, const int vectors) {
+    ROLLED for (int i = 0; i < vectors / 2; ++i)
+        vstore16((float16)(vload16(2 * i, row).even, vload16(2 * i + 1, row).even), i, row);
+}
+
+/* Knots between those of a row's first `vectors`, in twice as many; from the last on, so that none is overwritten. */
+static void insert_knots(__global float *row, const int vectors) {
+    float16 x = vload16(vectors - 1, row), after = vload16(0, row);
+    const float16 last = x;
+    ROLLED for (int i = vectors - 1; i >= 0; --i) {
+        const float16 before = i > 0 ? vload16(i - 1, row) : last;
+        const float16 left = (float16)(before.sf, x.s01234567, x.s89ab, x.scd, x.se);
+        const float16 right = (float16)(x.s1, x.s23, x.s4567, x.s89abcdef, after.s0);
+        const float16 even = 0.125f * (left + right) + 0.75f * x, odd = 0.5f * (x + right);
+        float16 low, high;
+        low.even = even.lo;
+        low.odd = odd.lo;
+        high.even = even.hi;
+        high.odd = odd.hi;
+        vstore16(low, 2 * i, row);
+        vstore16(high, 2 * i + 1, row);
+        after = x;
+        x = before;
+    }
+}
+
 /* A row, BLOCK vectors at a time with one on either side, whose 15 nearest lanes suffice. */
-__kernel void filter_azimuths(__global float *table, const int azimuths) {
+__kernel void filter_azimuths(__global float *table, const int azimuths, __global const int *every) {
     __global float *row = table + (long)(get_global_id(1) * get_global_size(0) + get_global_id(0)) * azimuths;
-    const int vectors = azimuths / LANES;
+    const int all = azimuths / LANES, vectors = all / every[get_global_id(1)];
+    ROLLED for (int left = all; left > vectors; left /= 2) halve(row, left);
     const float gain = sqrt(3.0f) * (1.0f - Z2) * (1.0f + Z2) * (1.0f + Z4) * (1.0f + Z8) * (1.0f + Z8 * Z8);
     const float16 first = vload16(0, row);
     float16 before = vload16(vectors - 1, row), line[BLOCK + 2];
@@ -80,6 +111,7 @@ __kernel void filter_azimuths(__global float *table, const int azimuths) {
         factor_1(line, count + 2);
         ROLLED for (int i = 0; i < count; ++i) vstore16(gain * line[i + 1], from + i, row);
     }
+    ROLLED for (int made = vectors; made < all; made *= 2) insert_knots(row, made);
 }
 
 /* A ring beyond either end: its place in the table, and whether it is half a turn on. */

@@ -16,9 +16,14 @@ float c_cos(vec3 wi, vec3 wr) {
     return SHADOWING ? c * min(1.0, 2.0 * s.z * min(wi.z, wr.z) / one_plus_dot) : c;
 }
 
+// the colour of directions of which the table says nothing: sRGB's magenta at 1 RU, as X, Y, Z
+const vec3 NOT_COMPUTED = vec3(0.5929, 0.2848, 0.9698);
+
 // X, Y, Z of the reflected light, C cos(theta_i) value, for unit vectors towards the light and the viewer: 0 at and
-// below the horizon, never negative.
-vec3 diffraction(vec3 wi, vec3 wr) {
+// below the horizon, never negative. `computed` is false, and the colour NOT_COMPUTED, where the table has no value.
+vec3 diffraction(vec3 wi, vec3 wr, out bool computed) {
+    computed = true;
     if (min(wi.z, wr.z) <= 0.0) return vec3(0.0);
-    return max(c_cos(wi, wr) * table_value(-wi - wr), 0.0);
+    vec3 value = table_value(-wi - wr, computed);
+    return computed ? max(c_cos(wi, wr) * value, 0.0) : NOT_COMPUTED;
 }

@@ -19,10 +19,11 @@ float coordinate(float u) {
     return (0.5 * (t + 1.0) * (N - 1.0) + 0.5) / N;
 }
 
-// X, Y, Z at (u, v, w) = -wi - wr, without C cos(theta_i); 0 where nothing was computed.
-vec3 table_value(vec3 uvw) {
+// X, Y, Z at (u, v, w) = -wi - wr, without C cos(theta_i); `computed` is false, and all are 0, where nothing is known.
+vec3 table_value(vec3 uvw, out bool computed) {
     vec2 at = vec2(coordinate(uvw.x), coordinate(uvw.y));
-    if (texture(I, vec3(at, 0)).a < 0.9999) return vec3(0.0);
+    computed = texture(I, vec3(at, 0)).a >= 0.9999;
+    if (!computed) return vec3(0.0);
     vec3 sum = vec3(0.0);
     for (int p = POWERS - 1; p >= 0; --p)       // Horner's rule
         sum = sum * uvw.z + scale[p] * texture(I, vec3(at, p)).rgb;

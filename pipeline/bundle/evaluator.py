@@ -4,7 +4,7 @@
 
 reads rows of theta_i,phi_i,theta_r,phi_r (light, view; degrees), prints X,Y,Z: linear, not sRGB.
 X,Y,Z are in the unit that manifest.json states.
-Directions point away from the surface, z is its normal. Values below the horizon, not computed or negative are 0.
+Directions point away from the surface, z is its normal. Values below the horizon or negative are 0, not computed nan.
 """
 
 import json
@@ -35,8 +35,8 @@ class BundleTables:
         self.table = textures(self.manifest["grid"], planes, [entry["scale"] for entry in images])
 
     def xyz(self, wi: Array, wr: Array) -> Array:
-        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3)."""
-        return np.asarray(np.fmax(self.signed(wi, wr), 0.0))
+        """Computes XYZ (directions, 3) for unit vectors wi, wr (directions, 3); nan where not computed."""
+        return np.asarray(np.maximum(self.signed(wi, wr), 0.0))
 
     def signed(self, wi: Array, wr: Array) -> Array:
         """Computes XYZ (directions, 3) with the negative values of overshoots, and nan where not computed."""
@@ -110,6 +110,9 @@ if __name__ == "__main__":
         found = BundleTables(Path(__file__).parent).signed(direction(*angles[:, :2].T), direction(*angles[:, 2:].T))
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         sys.exit(f"{sys.argv[1]}: {error}")
-    print("X,Y,Z", *(",".join(f"{value:.12g}" for value in row) for row in np.fmax(found, 0.0)), sep="\n")
-    for count, why in ((np.isnan(found).any(1).sum(), "not computed"), ((found < 0.0).any(1).sum(), "negative")):
-        print(f"{count} of {len(found)} rows were {why}, now 0\n" if count else "", end="", file=sys.stderr)
+    print("X,Y,Z", *(",".join(f"{value:.12g}" for value in row) for row in np.maximum(found, 0.0)), sep="\n")
+    for count, why in (
+        (np.isnan(found).any(1).sum(), "not computed"),
+        ((found < 0.0).any(1).sum(), "negative, now 0"),
+    ):
+        print(f"{count} of {len(found)} rows were {why}\n" if count else "", end="", file=sys.stderr)

@@ -24,7 +24,7 @@ MOST_SIDE = 32768
 # another machine may round the sine of a scene's angle differently
 SINE_ROUNDS = 1e-9
 
-Constant = bool | int | float
+Constant = bool | int | float | list[int]
 Pixels = NDArray[np.floating[Any]]
 # lists what is impossible about the pixels of one image: (rows, columns) by channel
 TexelCheck = Callable[[Mapping[str, Pixels]], list[str]]

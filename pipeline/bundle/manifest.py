@@ -16,7 +16,7 @@ from pipeline.bundle.material import MaterialEntry
 from pipeline.layouts import OneOf
 from pipeline.validated import Finite, Positive, Validated
 
-SCHEMA_VERSION: Literal[3] = 3
+SCHEMA_VERSION: Literal[4] = 4
 _MOST_TABLES, _MOST_MAPS = 1024, 4096
 
 AnyImage = Annotated[TableImage, OneOf(lambda name: layouts.bundled(name).image)]
@@ -115,7 +115,7 @@ class Provenance(Validated):
 class Manifest(Validated):
     """The content of manifest.json."""
 
-    schema_version: Literal[3]
+    schema_version: Literal[4]
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
     version: Annotated[str, Field(pattern=r"^\d+\.\d+\.\d+$")]
     licence: str

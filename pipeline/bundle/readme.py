@@ -4,6 +4,7 @@ templates/ has the text, and the folder of each layout its part of it; kernels/s
 """
 
 import re
+import textwrap
 from collections.abc import Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -16,7 +17,8 @@ from pipeline.report import template
 
 # the factor C, which follows the look-up of any layout
 BRDF = files("kernels").joinpath("shaders", "brdf.glsl")
-_CONSTANT = re.compile(r"^(const \w+ (\w+) = )[^;]*;", re.MULTILINE)
+_CONSTANT = re.compile(r"^(const (?:bool|int|float) (\w+)(?:\[[^]]*\])? = )[^;]*;", re.MULTILINE)
+_LINE = 110
 
 
 def text(manifest: Manifest, table: Prepared) -> str:
@@ -64,4 +66,7 @@ def shader(file: Traversable, constants: Mapping[str, Constant]) -> str:
 
 
 def _literal(value: Constant) -> str:
+    if isinstance(value, list):
+        numbers = textwrap.fill(", ".join(map(str, value)), _LINE, initial_indent="    ", subsequent_indent="    ")
+        return f"int[](\n{numbers})"
     return str(value).lower() if isinstance(value, bool) else repr(value)

@@ -91,3 +91,8 @@ class PolarGrid:
     def texels(self) -> int:
         """Number of texels."""
         return self.rings.count * self.azimuths.count
+
+    def area(self) -> Array:
+        """Computes the area of (u, v) around every texel (rings, azimuths), dimensionless."""
+        rho, phi = self.rings.rho(), np.unwrap(self.azimuths.phi())
+        return np.outer(rho * np.gradient(rho), np.abs(np.gradient(phi)))

@@ -22,7 +22,7 @@ LAYOUTS = ("taylor", "polar")
 # the polar table is coarse, within a large budget, so that the bake is quick
 TABLES: dict[str, dict[str, Any]] = {
     "taylor": {"layout": "taylor", "resolution": 41, "power": 3.0, "tolerance": 1e-2},
-    "polar": {"layout": "polar", "rings": 40, "azimuths": 192, "w_terms": 12},
+    "polar": {"layout": "polar", "rings": 80, "azimuths": 256, "w_terms": 12},
 }
 SMALL: dict[str, Any] = {
     "name": "small",

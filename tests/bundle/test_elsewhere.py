@@ -54,7 +54,9 @@ IMPOSSIBLE: dict[str, list[dict[str, Any]]] = {
         {"grid__envelope_exponent": float("nan")},
         {"grid__envelope_exponent": 1e6},
         {"grid__rho_max": 1.0},
-        {"grid__height": 1},
+        {"grid__height": 0},
+        {"grid__rings": 1},
+        {"grid__covered_share": 1.5},
     ],
 }
 

@@ -28,7 +28,11 @@ float R(float cos_half) { return 0.04 + 0.96 * pow(1.0 - cos_half, 5.0); }
 in vec3 light;
 in vec3 view;
 out vec4 colour;
-void main() { colour = vec4(diffraction(normalize(light), normalize(view)), 1.0); }
+void main() {
+    bool computed;
+    colour.rgb = diffraction(normalize(light), normalize(view), computed);
+    colour.a = computed ? 1.0 : 0.0;
+}
 """
 
 
@@ -94,9 +98,9 @@ def test_other_constants_than_the_files_are_refused(constants: dict[str, float])
 def in_float32(bundle: evaluator.BundleTables, wi: np.ndarray, wr: np.ndarray) -> np.ndarray:
     """Transcribes polar.glsl and brdf.glsl, line by line and in float32, for Schlick's reflectance."""
     f, grid, material = np.float32, bundle.manifest["grid"], bundle.manifest["material"]
-    texels = bundle.table.texels.astype(f)
-    rings, azimuths, _ = texels.shape
-    terms, outputs = grid["w_terms"], texels.shape[2]
+    texels, table = bundle.table.texels.astype(f), bundle.table
+    rings, azimuths = grid["rings"], grid["azimuths"]
+    terms, outputs = grid["w_terms"], texels.shape[1]
     uvw = -wi - wr
     rho = np.sqrt(uvw[:, 0] ** 2 + uvw[:, 1] ** 2)
     cos, sin = f(np.cos(grid["axis_rad"])), f(np.sin(grid["axis_rad"]))
@@ -106,8 +110,10 @@ def in_float32(bundle: evaluator.BundleTables, wi: np.ndarray, wr: np.ndarray) -
     azimuth = (turn - np.floor(turn)) * f(azimuths)
     found = np.zeros((len(wi), outputs), f)
     for a, across in enumerate(look_up.spline(ring - np.floor(ring))):
-        for b, along in enumerate(look_up.spline(azimuth - np.floor(azimuth))):
-            at = bundle.table.place(ring.astype(int) - 1 + a, azimuth.astype(int) - 1 + b)
+        row = ring.astype(int) - 1 + a
+        knot = azimuth / table.every[table.mirrored(row) // 16].astype(f)
+        for b, along in enumerate(look_up.spline(knot - np.floor(knot))):
+            at = table.place(row, knot.astype(int) - 1 + b)
             found += (across * along)[:, None].astype(f) * texels[at]
     w_max = np.sqrt(np.maximum(f(4) - rho * rho, f(1e-6)))
     x = np.clip(f(2) * np.abs(uvw[:, 2]) / w_max - f(1), f(-1), f(1))

@@ -114,8 +114,8 @@ def test_checksums_that_are_not_text(bundle: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "fault"),
     [
-        ('"schema_version": 3', '"schema_version": 1', "schema_version"),
-        ('"schema_version": 3', '"schema_version": 3, "more": 0', "more"),
+        ('"schema_version": 4', '"schema_version": 1', "schema_version"),
+        ('"schema_version": 4', '"schema_version": 4, "more": 0', "more"),
         ('"file": "tables/I_00.exr"', '"file": "../I_00.exr"', "tables.0.taylor.file"),
         ('"file": "tables/I_00.exr"', '"file": "tables/none.exr"', "names tables/none.exr, which is missing"),
         ('"version": "1.0.0"', '"version": "1.0.1"', "describes small-1.0.1"),

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from kernels import cubic_spline
 from pipeline.arrays import Array
-from pipeline.diffraction import power_spectrum
+from pipeline.diffraction import power_spectrum, tiles
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.reference import Reference
 from pipeline.optics import brdf, geometry
@@ -23,13 +23,14 @@ from pipeline.tables.polar.table import PolarTable
 from tests.support import snake
 
 GRID = PolarGrid(Rings(24, 0.3), Azimuths(96, 0.7, 0.4))
+TILES = tiles.whole(GRID)
 W_TERMS = 4
 
 
 def table_of(shapes: Array, amplitude: Array) -> PolarTable:
     """sum_i amplitude_i shape_i, with shapes (n, 3, w terms) and amplitudes (n, rings, azimuths)."""
     values = np.einsum("nck,nra->rcka", shapes, amplitude)
-    return PolarTable(np.ascontiguousarray(values, dtype=np.float32), GRID)
+    return PolarTable(np.ascontiguousarray(values, dtype=np.float32), TILES)
 
 
 def noise(*shape: int) -> Array:
@@ -64,14 +65,14 @@ def test_samples_equal_look_ups_at_the_nodes() -> None:
     rho, phi = GRID.rings.rho()[ring].ravel(), GRID.azimuths.phi()[azimuth].ravel()
     # |w| = w_max makes every Chebyshev polynomial 1
     uvw = np.stack([rho * np.cos(phi), rho * np.sin(phi), -np.sqrt(4.0 - np.minimum(rho, 1.99999) ** 2)], axis=-1)
-    found = PolarTable(values.reshape(24, 3, 4, 96), GRID).look_up(uvw)
+    found = PolarTable(values.reshape(24, 3, 4, 96), TILES).look_up(uvw)
     expected = samples(values).reshape(24, 3, 4, 96).sum(axis=2)
     # at rho = 0 the azimuth is undefined
     np.testing.assert_allclose(found.reshape(24, 96, 3)[1:], np.moveaxis(expected, 1, 2)[1:], atol=2e-5)
 
 
 def test_textures_without_compression_equal_the_table() -> None:
-    table = PolarTable(noise(24, 3, W_TERMS, 96).astype(np.float32), GRID)
+    table = PolarTable(noise(24, 3, W_TERMS, 96).astype(np.float32), TILES)
     assert whole(table).count == most_textures(table) == 3
     np.testing.assert_array_equal(whole(table).table().values, table.values)
 
@@ -93,7 +94,7 @@ def test_every_number_of_textures_keeps_the_mirror_directions() -> None:
     amplitude[:8, :4], amplitude[8] = 0.0, np.arange(24)[:, None] < 4
     samples_of = table_of(noise(9, 3, W_TERMS), amplitude).values.reshape(24, -1, 96)
     values = cubic_spline.coefficients(np.ascontiguousarray(samples_of)).reshape(24, 3, W_TERMS, 96)
-    table = PolarTable(values, GRID)
+    table = PolarTable(values, TILES)
     mirror = np.stack([np.zeros(9), np.zeros(9), -np.linspace(0.1, 2.0, 9)], axis=-1)
     for textures in (1, 2):
         np.testing.assert_allclose(look_up(compress(table, textures, None), mirror), table.look_up(mirror), atol=2e-5)
@@ -116,7 +117,7 @@ def smooth_table(fall: Array) -> PolarTable:
     phi = GRID.azimuths.phi()
     turning = 2.0 + np.cos(2.0 * phi)[:, None] * np.sin(np.arange(3 * W_TERMS))
     made = cubic_spline.coefficients(np.ascontiguousarray(fall[:, None, None] * turning.T, dtype=np.float32))
-    return PolarTable(made.reshape(24, 3, W_TERMS, 96), GRID)
+    return PolarTable(made.reshape(24, 3, W_TERMS, 96), TILES)
 
 
 def test_the_envelope_is_found() -> None:
@@ -132,7 +133,7 @@ def test_black_rings_do_not_change_the_envelope() -> None:
     rings = [
         np.maximum(bright, least)[:, None, None, None] * np.ones((24, 3, W_TERMS, 96)) for least in (1e-14, 1e-25)
     ]
-    found = [flattened(whole(PolarTable(values.astype(np.float32), GRID))).envelope for values in rings]
+    found = [flattened(whole(PolarTable(values.astype(np.float32), TILES))).envelope for values in rings]
     assert found[0].exponent == pytest.approx(found[1].exponent, rel=1e-3)
 
 
@@ -179,7 +180,7 @@ def in_half(textures: Textures) -> tuple[Textures, float]:
     scale = 2.0**-14 * np.abs(flat.values).max(axis=(0, 2), keepdims=True)
     stored: NDArray[np.float16] = (flat.values / scale).astype(np.float16)
     size = np.abs(stored.astype(np.float32))
-    back = Textures(stored.astype(np.float32) * scale, flat.basis, flat.grid, flat.envelope)
+    back = Textures(stored.astype(np.float32) * scale, flat.basis, flat.tiles, flat.envelope)
     return back, float(np.mean((size > 0.0) & (size < 2.0**-14)))
 
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import spline_filter1d
 
 from kernels import cubic_spline
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.tiles import whole
 from pipeline.optics.light import Light, trapezoid
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar import quadrature
@@ -26,6 +28,26 @@ def test_spline_coefficients_equal_those_of_scipy() -> None:
     np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
+def test_a_thinned_rings_coefficients_are_those_of_the_spline_through_fewer_samples() -> None:
+    rng = np.random.default_rng(4)
+    samples, every = rng.random((30, 2, 256), np.float32), np.repeat([4, 2, 1], 10)
+    across = cubic_spline.coefficients(samples.copy())
+    around = (np.roll(across, 1, axis=2) + 4.0 * across + np.roll(across, -1, axis=2)) / 6.0
+    place = np.linspace(0.0, 256.0, 777)
+    for ring, found in enumerate(cubic_spline.coefficients(samples.copy(), every)):
+        knots = np.append(around[ring, 0, :: every[ring]], around[ring, 0, 0])
+        through = CubicSpline(np.arange(0, 257, every[ring]), knots, bc_type="periodic")
+        fine = CubicSpline(
+            np.arange(257), np.append(values_at_knots(found[0]), values_at_knots(found[0])[0]), bc_type="periodic"
+        )
+        np.testing.assert_allclose(fine(place), through(place), atol=4e-6)
+
+
+def values_at_knots(coefficients: np.ndarray) -> np.ndarray:
+    """The spline of periodic B-spline coefficients at its knots."""
+    return (np.roll(coefficients, 1) + 4.0 * coefficients + np.roll(coefficients, -1)) / 6.0
+
+
 def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
     """A table of function(u, v) in X, twice the function in Y and the function times |w| / w_max in Z."""
     rho, phi = rings.rho()[:, None], azimuths.phi()
@@ -35,7 +57,7 @@ def table_of(function, azimuths: Azimuths, rings: Rings) -> PolarTable:
     # |w| / w_max = (T_0 + T_1) / 2
     samples[:, 8] = samples[:, 9] = 0.5 * values
     coefficients = cubic_spline.coefficients(samples)
-    return PolarTable(coefficients.reshape(rings.count, 3, 4, azimuths.count), PolarGrid(rings, azimuths))
+    return PolarTable(coefficients.reshape(rings.count, 3, 4, azimuths.count), whole(PolarGrid(rings, azimuths)))
 
 
 def directions(rho: np.ndarray, phi: np.ndarray, share: float) -> np.ndarray:

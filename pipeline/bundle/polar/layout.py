@@ -1,5 +1,6 @@
 """The entries of polar tables in a manifest."""
 
+import itertools
 import math
 from importlib.resources import files
 from typing import Annotated, Literal, Self
@@ -18,9 +19,11 @@ from pipeline.bundle.layout import (
     StorageLoss,
     TableImage,
 )
+from pipeline.bundle.polar.atlas import ABSENT
+from pipeline.diffraction.tiles import AZIMUTHS, RINGS
 from pipeline.optics.colour import ColourError
 from pipeline.scene.model import Scene
-from pipeline.validated import Finite
+from pipeline.validated import Finite, Validated
 
 Length = Annotated[float, Field(ge=1e-9, le=1e9)]
 Coefficient = Annotated[float, Field(ge=-1e30, le=1e30)]
@@ -39,12 +42,20 @@ class PolarImage(TableImage):
 class PolarGridEntry(GridEntry):
     """Positions of the texels of a polar table in (u, v), and the formula of the look-up.
 
+    width, height: of the images. every: of each band, which of its azimuths it keeps. starts: of each band and
+    sector, row * width + column of its first texel in the images, -1 where it is absent. covered_share: of the disc
+    rho <= rho_max, the part whose tiles are present.
     basis: (outputs, 3, w_terms); None where every output is one term.
     """
 
     layout: Literal["polar"]
-    width: Annotated[int, Field(ge=4, le=MOST_SIDE, multiple_of=2)]
-    height: Annotated[int, Field(ge=2, le=4096)]
+    width: Annotated[int, Field(ge=1, le=MOST_SIDE)]
+    height: Annotated[int, Field(ge=1, le=MOST_SIDE)]
+    rings: Annotated[int, Field(ge=2, le=4096)]
+    azimuths: Annotated[int, Field(ge=4, le=MOST_SIDE, multiple_of=2)]
+    every: list[Annotated[int, Field(ge=1, le=4)]]
+    starts: list[list[Annotated[int, Field(ge=ABSENT, le=MOST_SIDE**2)]]]
+    covered_share: Share
     r0: Length
     step: Length
     rho_max: Annotated[float, Field(ge=1e-9, le=2)]
@@ -54,23 +65,28 @@ class PolarGridEntry(GridEntry):
     envelope_radius: Length
     envelope_exponent: Finite
     basis: list[list[list[Coefficient]]] | None
-    rows: str = (
-        "row i (row 0 is the first line of the image) is the ring rho = r0 sinh(i step), rho = sqrt(u^2 + v^2), "
-        "step = asinh(rho_max / r0) / (height - 1); so i = asinh(rho / r0) / step"
+    ring: str = (
+        "ring i is rho = r0 sinh(i step), rho = sqrt(u^2 + v^2), step = asinh(rho_max / r0) / (rings - 1); so "
+        "i = asinh(rho / r0) / step"
     )
-    columns: str = (
-        "column j is the azimuth with atan2(v', stretch u') = 2 pi j / width, (u', v') = (u, v) turned by -axis_rad: "
-        "u' = cos(axis_rad) u + sin(axis_rad) v, v' = cos(axis_rad) v - sin(axis_rad) u"
+    azimuth: str = (
+        "azimuth j has atan2(v', stretch u') = 2 pi j / azimuths, (u', v') = (u, v) turned by -axis_rad: "
+        "u' = cos(axis_rad) u + sin(axis_rad) v, v' = cos(axis_rad) v - sin(axis_rad) u. A ring of band b = i div 16 "
+        "has its knots at every e-th azimuth, e = every[b]: knot c is azimuth c e, of azimuths / e"
     )
-    texture: str = "texel (i, j) has its centre at texture coordinate ((j + 1/2) / width, (i + 1/2) / height)"
+    tiles: str = (
+        "rings 16 b + x and knots c with c e div 128 = s are tile (b, s). The texel of its ring 16 b + x and of its "
+        "knot y, counted from its first, is number starts[b][s] + x width + y of the image, line by line from the "
+        "first; starts[b][s] = -1: the tile is absent, nothing is known there"
+    )
     interpolation: str = (
-        "cubic B-spline along both indices; texels are its coefficients, not values. At t = i - floor(i) the texels "
+        "cubic B-spline along rings and knots; texels are its coefficients, not values. At t = i - floor(i) those of "
         "floor(i) - 1, + 0, + 1, + 2 have the weights (1 - t)^3 / 6, (4 - 3 t^2 (2 - t)) / 6, "
-        "(4 - 3 (1 - t)^2 (1 + t)) / 6, t^3 / 6"
+        "(4 - 3 (1 - t)^2 (1 + t)) / 6, t^3 / 6. Each of the four rings has its own knots about j / e"
     )
     border: str = (
-        "columns are periodic; row -i is row i after half a turn, (-i, j) = (i, j + width / 2), since the first ring "
-        "is one point; beyond the last row they are mirrored, (height - 1 + i, j) = (height - 1 - i, j)"
+        "knots are periodic; ring -i is ring i after half a turn, (-i, c) = (i, c + azimuths / (2 e)), since the "
+        "first ring is one point; beyond the last ring they are mirrored, (rings - 1 + i, c) = (rings - 1 - i, c)"
     )
     outputs: str = "output o, interpolated, is channel o mod 4 (R, G, B, A) of table image o div 4, times its scale"
     terms: str = (
@@ -84,16 +100,32 @@ class PolarGridEntry(GridEntry):
 
     @model_validator(mode="after")
     def is_a_grid(self) -> Self:
-        """Checks that the step leads to the last ring, and that the envelope fits a double.
+        """Checks that the step leads to the last ring, that tiles fit the images, and the envelope a double.
 
         Raises ValueError, which pydantic reports.
         """
-        expected = math.asinh(self.rho_max / self.r0) / (self.height - 1)
+        expected = math.asinh(self.rho_max / self.r0) / (self.rings - 1)
         if not math.isclose(self.step, expected, rel_tol=1e-9):
-            raise ValueError(f"step is {self.step:g}, but r0, rho_max and height give {expected:g}")
+            raise ValueError(f"step is {self.step:g}, but r0, rho_max and rings give {expected:g}")
+        self._check_tiles()
         if abs(self.envelope_exponent) * math.log1p((2.0 / self.envelope_radius) ** 2) > _MOST_LOG_ENVELOPE:
             raise ValueError("envelope_radius and envelope_exponent give an envelope beyond 1e100 or below 1e-100")
         return self
+
+    def _check_tiles(self) -> None:
+        """Raises ValueError where the tiles are not those of the grid or leave the images."""
+        bands, sectors = math.ceil(self.rings / RINGS), math.ceil(self.azimuths / AZIMUTHS)
+        if len(self.every) != bands or [len(band) for band in self.starts] != [sectors] * bands:
+            raise ValueError(f"every and starts are not those of {bands} bands and {sectors} sectors")
+        if max(self.every) > 1 and (self.azimuths % AZIMUTHS or 3 in self.every):
+            raise ValueError(f"every is 1, or 2 or 4 where azimuths is a multiple of {AZIMUTHS}")
+        for (band, every), sector in itertools.product(enumerate(self.every), range(sectors)):
+            start = self.starts[band][sector]
+            row, column = divmod(start, self.width)
+            rows = min(RINGS, self.rings - RINGS * band)
+            columns = min(AZIMUTHS, self.azimuths - AZIMUTHS * sector) // every
+            if start != ABSENT and (row + rows > self.height or column + columns > self.width):
+                raise ValueError(f"starts[{band}][{sector}] is {start}, which leaves the images")
 
     def contradictions(self, images: int, scene: Scene | None) -> list[str]:
         """Compares the basis with the outputs that the images hold, and the last ring with the scene."""
@@ -115,14 +147,25 @@ class PolarGridEntry(GridEntry):
         return len(self.basis) == 4 * images and shapes == {(3, *3 * (self.w_terms,))}
 
 
+class MirrorLoss(Validated):
+    """The error that storage adds in the mirror directions of the lights.
+
+    added: at 1 RU. y: relative errors of Y. kept: whether `added` is on average below the just noticeable difference,
+    2.3, and `y` nowhere above 0.05.
+    """
+
+    added: ColourError
+    y: RelativeError
+    kept: bool
+
+
 class PolarLoss(StorageLoss):
     """The error of a polar table in few textures or half floats, on random directions.
 
     textures: number of RGBA textures; `most_textures` would hold the whole table. error: of the stored textures
-    against the exact sum. added: against the table as baked. added_in_mirror: the same in the mirror directions of
-    the lights, at 1 RU. y_in_mirror: relative errors of Y there. mirror_kept: whether `added_in_mirror` is on average
-    below the just noticeable difference, 2.3, and `y_in_mirror` nowhere above 0.05. subnormal_share: of all values,
-    those that half floats store with fewer than 11 bits; None for float.
+    against the exact sum. added: against the table as baked. mirror: the same in the mirror directions of the lights;
+    None where no tile holds them. subnormal_share: of all values, those that half floats store with fewer than 11
+    bits; None for float.
     """
 
     layout: Literal["polar"]
@@ -131,9 +174,7 @@ class PolarLoss(StorageLoss):
     most_textures: Count
     error: ColourError
     added: ColourError
-    added_in_mirror: ColourError
-    y_in_mirror: RelativeError
-    mirror_kept: bool
+    mirror: MirrorLoss | None
     subnormal_share: Share | None
 
 

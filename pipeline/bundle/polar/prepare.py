@@ -9,9 +9,11 @@ from pydantic import TypeAdapter
 
 from pipeline.accuracy.certificate import Certificate
 from pipeline.bundle.layout import Pixels, Prepared, TableImage
+from pipeline.bundle.polar.atlas import Atlas
 from pipeline.bundle.polar.layout import PolarGridEntry, PolarImage, PolarLoss
 from pipeline.bundle.polar.storage import Stored
 from pipeline.config.models import Config
+from pipeline.diffraction import tiles
 from pipeline.report import images
 from pipeline.tables.polar.compression import CHANNELS, Textures
 
@@ -21,8 +23,8 @@ _CONVENTION = (
 )
 _EVALUATION = (
     "XYZ = max(0, C cos(theta_i) value(u, v, |w|)); value = g(rho) sum_k T_k(x) sum_o output_o(u, v) "
-    "basis[o][channel][k], output_o looked up by cubic B-splines; see 'grid'. XYZ = 0 where wi.z <= 0 or wr.z <= 0, "
-    "and where rho > rho_max (1 + 1e-6), which was not computed"
+    "basis[o][channel][k], output_o looked up by cubic B-splines; see 'grid'. XYZ = 0 where wi.z <= 0 or wr.z <= 0. "
+    "Nothing is known where rho > rho_max (1 + 1e-6), and where one of the 4 x 4 texels is in an absent tile"
 )
 _WINDOW = (
     "g = exp(-r^2 / (2 sigma^2)), centred on the middle of the patch; where plan.windows > 1, |P|^2 is its mean over "
@@ -42,7 +44,7 @@ def prepare(
     Returns the layout's part of the bundle.
     """
     loss = None if summary["loss"] is None else PolarLoss.model_validate_json(json.dumps(summary["loss"]))
-    entry = grid_entry(stored.textures)
+    entry = grid_entry(stored.textures, stored.atlas)
     return Prepared(
         holds="value",
         conventions={"value": _CONVENTION, "window": _WINDOW},
@@ -55,8 +57,13 @@ def prepare(
         loss=loss,
         rho_max=entry.rho_max,
         constants={
-            "RINGS": entry.height,
-            "AZIMUTHS": entry.width,
+            "RINGS": entry.rings,
+            "AZIMUTHS": entry.azimuths,
+            "BAND": tiles.RINGS,
+            "SECTOR": tiles.AZIMUTHS,
+            "WIDTH": entry.width,
+            "EVERY": entry.every,
+            "STARTS": [start for band in entry.starts for start in band],
             "TEXTURES": stored.textures.count,
             "TERMS": entry.w_terms,
             "LOW_RANK": entry.basis is not None,
@@ -71,14 +78,19 @@ def prepare(
     )
 
 
-def grid_entry(textures: Textures) -> PolarGridEntry:
-    """Returns the manifest's entry on the positions and the meaning of the texels."""
+def grid_entry(textures: Textures, atlas: Atlas) -> PolarGridEntry:
+    """Returns the manifest's entry on the positions and the meaning of the texels; atlas: places of the tiles."""
     rings, azimuths = textures.grid.rings, textures.grid.azimuths
     outputs, _, terms = textures.basis.shape
     return PolarGridEntry(
         layout="polar",
-        width=azimuths.count,
-        height=rings.count,
+        width=atlas.width,
+        height=atlas.height,
+        rings=rings.count,
+        azimuths=azimuths.count,
+        every=list(textures.tiles.every),
+        starts=atlas.starts.tolist(),
+        covered_share=textures.tiles.covered_share(),
         r0=rings.r0,
         step=rings.step,
         rho_max=rings.rho_max,
@@ -92,11 +104,11 @@ def grid_entry(textures: Textures) -> PolarGridEntry:
 
 
 def _images(config: Config, stored: Stored) -> Iterator[tuple[TableImage, Pixels]]:
-    """Yields the entry and the pixels (rings, azimuths, RGBA) of tables/T_00.exr, tables/T_01.exr, ..."""
+    """Yields the entry and the pixels (rows, columns, RGBA) of tables/T_00.exr, tables/T_01.exr, ..."""
     in_half = config.publish.precision == "half"
     for q in range(stored.textures.count):
         outputs = slice(CHANNELS * q, CHANNELS * (q + 1))
-        pixels = np.moveaxis(stored.values[:, outputs], 1, -1)
+        pixels = np.moveaxis(stored.values[outputs], 0, -1)
         image = PolarImage(
             layout="polar",
             file=f"tables/T_{q:02d}.exr",
@@ -106,6 +118,6 @@ def _images(config: Config, stored: Stored) -> Iterator[tuple[TableImage, Pixels
             pixel_type=config.publish.precision,
             index=q,
             scale=stored.scale[outputs].tolist(),
-            half_subnormal_share=float(np.mean(stored.subnormal[:, outputs])) if in_half else None,
+            half_subnormal_share=float(np.mean(stored.subnormal[outputs])) if in_half else None,
         )
         yield image, pixels

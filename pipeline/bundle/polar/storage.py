@@ -11,7 +11,9 @@ from pipeline.accuracy.certificate import refuse_clamping
 from pipeline.accuracy.checks import MIRROR_FLOOR, RandomCheck, check_random, random_directions, relative_error
 from pipeline.arrays import Array
 from pipeline.bundle import half
-from pipeline.bundle.polar.layout import PolarLoss
+from pipeline.bundle.polar import atlas
+from pipeline.bundle.polar.atlas import Atlas
+from pipeline.bundle.polar.layout import MirrorLoss, PolarLoss
 from pipeline.config.models import Config, Publish
 from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
@@ -41,12 +43,13 @@ _MIRROR_KEPT = 0.05
 class Stored:
     """Textures as they are stored in files.
 
-    values: float32 or float16 (rings, outputs, azimuths), divided by `scale`. scale: (outputs,).
-    textures: as they are read back.
+    values: float32 or float16 (outputs, height, width) of the picture, divided by `scale`. scale: (outputs,).
+    atlas: the places of tiles in the picture. textures: as they are read back.
     """
 
     values: NDArray[np.floating[Any]]
     scale: Array
+    atlas: Atlas
     textures: Textures
 
     @property
@@ -62,13 +65,19 @@ class Stored:
 
 def store(textures: Textures, precision: str) -> Stored:
     """Stores textures at a precision: "float" as they are, "half" divided by an envelope and a scale per output."""
+    places = atlas.place(textures.tiles)
     if precision == "float":
-        return Stored(textures.values, np.ones(textures.values.shape[1]), textures)
+        return Stored(places.packed(textures.values), np.ones(textures.values.shape[1]), places, textures)
     flat = flattened(textures)
-    scale = half.scales(np.max(np.abs(flat.values), axis=(0, 2)).astype(np.float64))
-    factor = scale.astype(np.float32)[:, None]
-    values = (flat.values / factor).astype(np.float16)
-    return Stored(values, scale, replace(flat, values=values.astype(np.float32) * factor))
+    picture = places.packed(flat.values)
+    scale = half.scales(np.max(np.abs(picture), axis=(1, 2)).astype(np.float64))
+    values = (picture / scale.astype(np.float32)[:, None, None]).astype(np.float16)
+    return Stored(values, scale, places, replace(flat, values=read_back(places, values, scale)))
+
+
+def read_back(places: Atlas, values: NDArray[np.floating[Any]], scale: Array) -> NDArray[np.float32]:
+    """Returns the coefficients (rings, outputs, azimuths) of a picture; parameters as in `Stored`."""
+    return places.unpacked(values.astype(np.float32) * scale.astype(np.float32)[:, None, None])
 
 
 def is_whole(config: Config) -> bool:
@@ -133,41 +142,55 @@ def _textures(table: PolarTable, count: int, config: Config) -> Textures:
     return whole(table) if count == most_textures(table) else compress(table, count, config.scene)
 
 
+@dataclass(frozen=True)
+class _Known:
+    """Unit vectors wi, wr (n, 3), and XYZ (n, 3) of the table there."""
+
+    wi: Array
+    wr: Array
+    xyz: Array
+
+
 class _Measure:
     """Compares stored textures with the exact sum and with the table itself, on random directions."""
 
     def __init__(self, config: Config, table: PolarTable, reference: Reference) -> None:
         self._config, self._most, self._unit = config, most_textures(table), config.radiometry.unit
-        self._wi, self._wr = random_pairs(config.scene, random_directions(reference.places.count), _SEED)
-        self._truth = reference.xyz(config.light, config.material, self._wi, self._wr)
-        evaluate = table_evaluator(table, config.radiometry)
-        self._mirrored = self._wi * [-1.0, -1.0, 1.0]
-        self._before, self._mirror = (evaluate(self._wi, views) for views in (self._wr, self._mirrored))
-        self._mirror_y = config.radiometry.mirror_luminance(self._wi, self._mirrored)
+        self._evaluate_table = table_evaluator(table, config.radiometry)
+        wi, wr = random_pairs(config.scene, random_directions(reference.places.count), _SEED)
+        self._random, self._mirror = self._known(wi, wr), self._known(wi, wi * [-1.0, -1.0, 1.0])
+        self._truth = reference.xyz(config.light, config.material, self._random.wi, self._random.wr)
+
+    def _known(self, wi: Array, wr: Array) -> _Known:
+        """Returns the directions that covered tiles hold, with their colours."""
+        xyz = self._evaluate_table(wi, wr)
+        known = np.isfinite(xyz).all(axis=1)
+        return _Known(wi[known], wr[known], xyz[known])
 
     def __call__(self, stored: Stored) -> PolarLoss:
-        # every grid of rings holds the mirror directions, for any scene
-        after, mirror = (self._evaluate(stored.textures, views) for views in (self._wr, self._mirrored))
+        after = self._evaluate(stored.textures, self._random)
         exposure = self._config.accuracy.exposure_ru
         in_half = self._config.publish.precision == "half"
-        added_in_mirror = self._errors(mirror, self._mirror, _MIRROR_EXPOSURE_RU)
-        y_after, y_before = (xyz[:, 1] / self._mirror_y for xyz in (mirror, self._mirror))
-        y_in_mirror = relative_error(y_after, y_before, MIRROR_FLOOR)
         return PolarLoss(
             layout="polar",
-            directions=len(self._wi),
+            directions=len(after),
             textures=stored.textures.count,
             most_textures=self._most,
             error=self._errors(after, self._truth, exposure),
-            added=self._errors(after, self._before, exposure),
-            added_in_mirror=added_in_mirror,
-            y_in_mirror=y_in_mirror,
-            mirror_kept=added_in_mirror.mean <= _NOTICEABLE_DELTA_E and y_in_mirror.maximum <= _MIRROR_KEPT,
+            added=self._errors(after, self._random.xyz, exposure),
+            mirror=self._mirror_loss(stored) if len(self._mirror.wi) else None,
             subnormal_share=float(np.mean(stored.subnormal)) if in_half else None,
         )
 
-    def _evaluate(self, textures: Textures, views: Array) -> Array:
-        return table_evaluator(textures, self._config.radiometry)(self._wi, views)
+    def _mirror_loss(self, stored: Stored) -> MirrorLoss:
+        before, after = self._mirror.xyz, self._evaluate(stored.textures, self._mirror)
+        unit = self._config.radiometry.mirror_luminance(self._mirror.wi, self._mirror.wr)
+        added = self._errors(after, before, _MIRROR_EXPOSURE_RU)
+        y = relative_error(after[:, 1] / unit, before[:, 1] / unit, MIRROR_FLOOR)
+        return MirrorLoss(added=added, y=y, kept=added.mean <= _NOTICEABLE_DELTA_E and y.maximum <= _MIRROR_KEPT)
+
+    def _evaluate(self, textures: Textures, directions: _Known) -> Array:
+        return table_evaluator(textures, self._config.radiometry)(directions.wi, directions.wr)
 
     def _errors(self, found: Array, truth: Array, exposure_ru: float) -> ColourError:
         error = delta_e(found / self._unit, truth / self._unit, exposure_ru)

@@ -8,6 +8,7 @@ from pipeline.evaluation.speed.machine import Machine, share
 from pipeline.evaluation.speed.paper import RESOLUTION, STEP_NM
 from pipeline.evaluation.speed.processes import Compiling
 from pipeline.evaluation.speed.suite import (
+    EQUAL,
     MAIN,
     NUFFT,
     NUMPY_POLAR,
@@ -41,14 +42,14 @@ def of_surface(found: SurfaceSpeed, machine: Machine) -> list[Check]:
 
     polar = min((p for p in found.points if p.method == POLAR and p.texels <= _TEXELS), key=lambda p: p.error.mean)
     grid = " x ".join(f"{polar.settings[axis]:g}" for axis in ("rings", "azimuths"))
-    where = f"{grid} texels, map of {found.map_size}^2, maximum {polar.error.maximum:.2g}"
+    where = f"{grid} grid, {polar.texels} texels, map of {found.map_size}^2, maximum {polar.error.maximum:.2g}"
     check("mean_error", polar.error.mean, where)
     check("percentile_99", polar.error.percentile_99, where)
     paper = found.point(PAPER, resolution=RESOLUTION, step_nm=STEP_NM)
     remark = f"{paper.error.mean:.3g} / {paper.error.percentile_99:.3g}" if paper else ""
     check("paper_error", paper.error.mean / polar.error.mean if paper else None, remark)
     for count in (3, 2):
-        stored = found.point(TEXTURES, **settings_of(MAIN), textures=count)
+        stored = found.point(TEXTURES, **settings_of(EQUAL), textures=count)
         remark = f"99th percentile {stored.error.percentile_99:.3g}" if stored else ""
         check(f"textures_{count}", stored.error.mean if stored else None, remark)
         check(f"mirror_{count}", stored.mirror_error if stored else None, "")

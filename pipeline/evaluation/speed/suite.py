@@ -26,13 +26,16 @@ from pipeline.progress import Progress, silent
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.polar.compression import compress, most_textures, whole
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.table import PolarTable
 
 PAPER, POLAR, TEXTURES = "paper's tables", "polar table", "polar table as RGBA16F"
 NUFFT = "polar table by FINUFFT"
 NUMPY_PAPER, NUMPY_POLAR = "paper's tables in plain numpy", "polar table in plain numpy"
-# 251 k texels, as many as the paper's 501 x 501; and as many for a grating, whose light lies on a line of the plane,
-# where fewer azimuths do
+# a grid of 251 k points, whose table is timed: E and integral are computed at all of them
 MAIN = PolarLayout(rings=140, azimuths=1792)
+# 249 k texels after thinning, nearly as many as the paper's 501 x 501; and as many points for a grating, whose light
+# lies on a line of the plane, where fewer azimuths do
+EQUAL = PolarLayout(rings=172, azimuths=2304)
 GRATING = PolarLayout(rings=300, azimuths=832, w_terms=12)
 # of the mirror: darker samples are compared in absolute terms
 _FLOOR = 1e-7
@@ -45,9 +48,9 @@ class Effort:
     """Extent of the measurements.
 
     map_size: pixels of the map's side. paper: (resolution, step in nm) of the paper's tables. polar: layouts of polar
-    tables. textures: numbers of textures. bakes: of the layout MAIN, before and after the other algorithms.
-    repeats: of everything else. numpy_nodes: nodes that plain numpy computes. nufft_azimuths, nufft_repeats: those of
-    FINUFFT. memory: whether peak memory is measured.
+    tables. textures: numbers of textures, of the layout EQUAL. bakes: of the layout MAIN, before and after the other
+    algorithms. repeats: of everything else. numpy_nodes: nodes that plain numpy computes. nufft_azimuths,
+    nufft_repeats: those of FINUFFT. memory: whether peak memory is measured.
     """
 
     map_size: int
@@ -71,7 +74,7 @@ FULL = Effort(
     polar=(
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((50, 640), (70, 896), (100, 1280))),
         MAIN,
-        PolarLayout(rings=157, azimuths=1600),
+        EQUAL,
         GRATING,
         *(PolarLayout(rings=r, azimuths=a) for r, a in ((200, 2560), (280, 3584))),
     ),
@@ -103,9 +106,10 @@ class Point:
     """One table by one algorithm: its cost, and the error of its map.
 
     method: one of the names above. settings: resolution and step_nm, or rings, azimuths and w_terms and, where
-    compressed, textures. texels: of the grid. seconds: from the height field to the table. bytes: of the table as
-    float32, or of its textures. scaled: whether the seconds are those of a sample, scaled by its size. mirror_error:
-    largest relative error of X, Y or Z in the mirror directions of lights at 0 to 85 degrees, of textures.
+    compressed, textures. texels: of the thinned grid. seconds: from the height field to the table. bytes: of the
+    table as float32, or of its textures. scaled: whether the seconds are those of a sample, scaled by its size.
+    mirror_error: largest relative error of X, Y or Z in the mirror directions of lights at 0 to 85 degrees, of
+    textures.
     """
 
     method: str
@@ -160,6 +164,11 @@ def settings_of(layout: PolarLayout) -> dict[str, float]:
     return {key: value for key, value in given.items() if value != "auto"}
 
 
+def _kept(table: PolarTable, nbytes: int) -> int:
+    """Return the bytes that are stored of a table with all azimuths in memory."""
+    return nbytes * table.tiles.texels // table.grid.texels
+
+
 def run(config: Config, field: HeightField, effort: Effort, progress: Progress = silent) -> SurfaceSpeed:
     """Measure one surface. The sections scene, table and accuracy of its config are not used."""
     return _Suite(config, field, effort, progress).run()
@@ -184,7 +193,7 @@ class _Suite:
         found, nufft_agrees = self._nufft(samples)
         baked = polar_bake.best(baked, polar_bake.bake(main, effort.bakes))
         self._polar(baked, found, numpy_pair_s)
-        self._textures(baked)
+        self._textures()
         timed = [*polar_bake.stages(main, baked), *self._paper()]
         measured = transforms.measure(main, effort.repeats)
         self._progress("the stack's transforms", 1.0)
@@ -250,15 +259,17 @@ class _Suite:
                 chosen = setting.make(self._field, self._config, layout)
                 made = polar_bake.bake(chosen, self._effort.repeats)
             pairs = int(np.sum(chosen.rules.count)) * chosen.plan.azimuths.count
-            size, error = made.table.values.nbytes, self._truth.error(made.table)
+            size, error = _kept(made.table, made.table.values.nbytes), self._truth.error(made.table)
             point = Point(POLAR, settings_of(layout), chosen.plan.texels, made.stages.total, size, error)
             self._points += [point, replace(point, method=NUMPY_POLAR, seconds=numpy_pair_s * pairs, scaled=True)]
             if by_nufft:
                 self._points.append(replace(point, method=NUFFT, seconds=by_nufft.seconds(chosen), scaled=True))
             self._progress("polar tables", (i + 1) / len(layouts))
 
-    def _textures(self, baked: TimedBake) -> None:
+    def _textures(self) -> None:
         """The polar table in few RGBA textures of half floats."""
+        chosen = setting.make(self._field, self._config, EQUAL)
+        baked = polar_bake.bake(chosen, self._effort.repeats)
         most = most_textures(baked.table)
         for count in sorted({min(count, most) for count in self._effort.textures}):
 
@@ -267,9 +278,9 @@ class _Suite:
                 return storage.store(whole_or_less, "half")
 
             stored, seconds = timed(store)
-            settings, error = {**settings_of(MAIN), "textures": count}, self._truth.error(stored.textures)
-            total = baked.stages.total + seconds
-            point = Point(TEXTURES, settings, self._main.plan.texels, total, stored.values.nbytes, error)
+            settings, error = {**settings_of(EQUAL), "textures": count}, self._truth.error(stored.textures)
+            total, size = baked.stages.total + seconds, _kept(baked.table, stored.values.nbytes)
+            point = Point(TEXTURES, settings, chosen.plan.texels, total, size, error)
             self._points.append(replace(point, mirror_error=self._mirrors.largest_error(stored.textures)))
         self._progress("textures", 1.0)
 

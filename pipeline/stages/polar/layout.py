@@ -41,7 +41,7 @@ def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
     return [
         ["Chebyshev terms, nodes in s", f"{power_spectrum['terms']}, {power_spectrum['s_nodes']}"],
         ["windows, speckle contrast", f"{power_spectrum['windows']}, {power_spectrum['speckle_contrast']:.2f}"],
-        ["rings × azimuths", f"{rings['count']} × {azimuths['count']}"],
+        ["rings × azimuths, texels kept", f"{rings['count']} × {azimuths['count']}, {table['texels']}"],
         ["rings evenly spaced below ρ =", f"{rings['r0']:.3g}"],
         [
             "azimuths denser by, around",
@@ -60,13 +60,18 @@ def _settings(power_spectrum: Summary, table: Summary) -> list[list[str]]:
 
 
 def _stored(config: Config, loss: dict[str, Any]) -> list[list[str]]:
-    mirror, verdict = loss["added_in_mirror"]["mean"], "kept" if loss["mirror_kept"] else "visibly changed"
-    return [
+    rows = [
         ["stored in", f"{config.publish.precision}, {loss['textures']} of {loss['most_textures']} textures"],
         ["mean ΔE that this adds", f"{loss['added']['mean']:.3g} at {loss['added']['exposure_ru']:g} RU"],
-        ["mean ΔE in mirror directions at 1 RU", f"{mirror:.3g}: the highlight is {verdict}"],
-        ["largest error of Y there", f"{100.0 * loss['y_in_mirror']['maximum']:.2g} %"],
     ]
+    mirror = loss["mirror"]
+    if mirror is not None:
+        verdict = "kept" if mirror["kept"] else "visibly changed"
+        rows += [
+            ["mean ΔE in mirror directions at 1 RU", f"{mirror['added']['mean']:.3g}: the highlight is {verdict}"],
+            ["largest error of Y there", f"{100.0 * mirror['y']['maximum']:.2g} %"],
+        ]
+    return rows
 
 
 def _at_wavelengths(artifact: Artifact) -> Callable[[Array, Array], Array]:

@@ -11,7 +11,7 @@ from pipeline.arrays import Array
 from pipeline.config.models import Config
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction.polar_grid import PolarGrid
-from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
+from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles, thinned
 from pipeline.optics.brdf import Radiometry
 from pipeline.scene.lights import Parallel
 from pipeline.scene.model import Scene
@@ -36,7 +36,7 @@ _KERNELS = ("polar_power_spectrum.cl", "dft_stack.cl", "spectral_operator.cl")
 class Savings:
     """Shares of a full bake that a scene saves.
 
-    texels: of the grid. values: of a texel. azimuths, radii: of the power spectrum E. frequencies: of the stack.
+    texels: of the thinned grid. values: of a texel. azimuths, radii: of E. frequencies: of the stack.
     """
 
     texels: float
@@ -83,7 +83,7 @@ class Shelf:
         bake, grid = self.tile.bake, self.tile.grid
         radius, radii = bake.radius_per_um, self.tile.radii(np.flatnonzero(tiles.covered.any(axis=1)))
         return Savings(
-            texels=1.0 - tiles.texels / grid.texels,
+            texels=1.0 - tiles.texels / thinned(grid).texels,
             values=1.0 - self.tile.outputs / (3 * bake.w_terms),
             azimuths=1.0 - len(self.tile.half_turn(tiles.covered)) / (grid.azimuths.count // 2),
             radii=1.0 - len(radius[radii]) / len(radius),

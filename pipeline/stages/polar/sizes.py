@@ -64,7 +64,9 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         # as stored in half floats, and as read back
         stored_bytes=0 if is_whole else 3 * integral.table_bytes // 2,
         # an image has four channels, here and in OpenEXR
-        prepared=Need({"image": 2 * 4 * 4 * rings.count * azimuths}),
+        prepared=Need(
+            {"image": 2 * 4 * 4 * rings.count * azimuths, **({"tiles": integral.table_bytes} if is_whole else {})}
+        ),
         written_bytes=e_bytes,
         delta_e=_expected_delta_e(foreseen),
     )

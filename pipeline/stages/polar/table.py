@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.tiles import Tiles
 from pipeline.progress import Progress
 from pipeline.stages import surface
 from pipeline.stages.polar import certificate, power_spectrum
@@ -60,11 +61,13 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
         "layout": "polar",
         "rings": asdict(table.grid.rings),
         "azimuths": asdict(table.grid.azimuths),
+        "tiles": {"covered": table.tiles.covered.tolist(), "every": list(table.tiles.every)},
+        "texels": table.tiles.texels,
         "w_terms": table.w_terms,
         "wavelengths": int(rules.count.max()),
         "wavelengths_mean": float(rules.count.mean()),
         "unknown_share": unknown,
-        "skipped_share": 1.0 - (table.grid.rings.rho_max / 2.0) ** 2,
+        "skipped_share": 1.0 - table.tiles.covered_share() * (table.grid.rings.rho_max / 2.0) ** 2,
         "certificate": asdict(certified),
         "spectral_error": None if spectral is None else asdict(spectral),
     }
@@ -77,13 +80,14 @@ def of(inputs: Inputs) -> polar.PolarTable:
 
 def load(artifact: Artifact) -> polar.PolarTable:
     """Reads the table of an artifact of this stage."""
-    return polar.PolarTable(arrays.load(artifact.folder / _FILE, "table"), grid_of(artifact))
+    return polar.PolarTable(arrays.load(artifact.folder / _FILE, "table"), tiles_of(artifact))
 
 
-def grid_of(artifact: Artifact) -> PolarGrid:
-    """Returns the grid in the record of an artifact of this stage."""
+def tiles_of(artifact: Artifact) -> Tiles:
+    """Returns the tiles in the record of an artifact of this stage."""
     found = artifact.summary
-    return PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
+    grid = PolarGrid(Rings(**found["rings"]), Azimuths(**found["azimuths"]))
+    return Tiles(grid, np.array(found["tiles"]["covered"], bool), tuple(found["tiles"]["every"]))
 
 
 def _work(config: Config) -> str:

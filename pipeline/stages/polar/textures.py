@@ -1,10 +1,8 @@
 """The stage "textures": table -> the textures that a bundle holds, with the certificate of what they hold."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.progress import Progress
@@ -51,7 +49,7 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     arrays.save(
         folder / _FILE,
         {
-            "texels": arrays.Named(stored.values, ("rho", "output", "phi"), "1"),
+            "texels": arrays.Named(stored.values, ("output", "row", "column"), "1"),
             "scale": arrays.Named(stored.scale, ("output",), "1"),
             "basis": arrays.Named(stored.textures.basis, ("output", "channel", "w_term"), "1"),
         },
@@ -92,13 +90,15 @@ def table_of(inputs: Inputs) -> Table:
 
 
 def _load(inputs: Inputs) -> "Stored":
-    from pipeline.bundle.polar.storage import Stored
+    from pipeline.bundle.polar import atlas, storage
 
     zarr = inputs["textures"].folder / _FILE
     values, scale, basis = (arrays.load(zarr, name) for name in ("texels", "scale", "basis"))
     envelope = Envelope(**arrays.attributes(zarr)["envelope"])
-    found = Textures(values.astype(np.float32), basis, table.grid_of(inputs["table"]), envelope)
-    return Stored(values, scale, replace(found, values=found.values * scale.astype(np.float32)[:, None]))
+    tiles = table.tiles_of(inputs["table"])
+    places = atlas.place(tiles)
+    textures = Textures(storage.read_back(places, values, scale), basis, tiles, envelope)
+    return storage.Stored(values, scale, places, textures)
 
 
 TEXTURES = Stage("textures", 3, ("surface", "table"), _parameters, _produce, uses_device=True, work=textures_work)

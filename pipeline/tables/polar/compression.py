@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from kernels import cubic_spline
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
+from pipeline.diffraction.tiles import Tiles
 from pipeline.optics import geometry
 from pipeline.optics.brdf import Radiometry
 from pipeline.scene.model import Scene
@@ -67,13 +68,18 @@ class Textures:
     """A polar table as textures of spline coefficients; look-ups are multiplied by the basis and the envelope.
 
     values: float32 (rings, outputs, azimuths), outputs a multiple of 4. basis: (outputs, 3, w terms).
-    grid: the rings and azimuths. envelope: g(rho).
+    tiles: as those of a polar table. envelope: g(rho).
     """
 
     values: NDArray[np.float32]
     basis: Array
-    grid: PolarGrid
+    tiles: Tiles
     envelope: Envelope = Envelope()
+
+    @property
+    def grid(self) -> PolarGrid:
+        """The rings and azimuths."""
+        return self.tiles.grid
 
     @property
     def count(self) -> int:
@@ -86,7 +92,7 @@ class Textures:
         return self.values.nbytes
 
     def look_up(self, uvw: Array) -> Array:
-        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the rings."""
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the covered tiles."""
         return self.envelope.at(np.hypot(uvw[:, 0], uvw[:, 1]))[:, None] * self._reconstructed.look_up(uvw)
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
@@ -102,7 +108,7 @@ class Textures:
         outputs, _, terms = self.basis.shape
         flat = self.basis.reshape(outputs, -1).T.astype(np.float32)
         rings, _, azimuths = self.values.shape
-        return PolarTable(np.matmul(flat, self.values).reshape(rings, 3, terms, azimuths), self.grid)
+        return PolarTable(np.matmul(flat, self.values).reshape(rings, 3, terms, azimuths), self.tiles)
 
 
 def most_textures(table: PolarTable) -> int:
@@ -115,7 +121,7 @@ def whole(table: PolarTable) -> Textures:
     rings, channels, terms, azimuths = table.values.shape
     outputs = channels * terms
     values = table.values.reshape(rings, outputs, azimuths)
-    return Textures(values, np.eye(outputs).reshape(outputs, channels, terms), table.grid)
+    return Textures(values, np.eye(outputs).reshape(outputs, channels, terms), table.tiles)
 
 
 def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
@@ -130,18 +136,19 @@ def compress(table: PolarTable, textures: int, scene: Scene | None) -> Textures:
     # |metric t|^2 is the visible error: in opponent channels, mean over |w|
     metric = np.kron(_OPPONENT, np.linalg.cholesky(gram).T)
     moments = sum(
-        weight * _unit_moments(metric @ ring.astype(np.float64))
-        for weight, ring in zip(density, full.values, strict=True)
+        weight * _unit_moments(metric @ ring[:, covered].astype(np.float64))
+        for weight, ring, covered in zip(density, full.values, table.tiles.mask(), strict=True)
     )
     kept = _components(moments, metric @ _mirror_texel(full), outputs)
     project = (kept.T @ metric).astype(np.float32)
     basis = np.asarray(np.linalg.solve(metric, kept).T.reshape(outputs, 3, table.w_terms))
-    return Textures(np.matmul(project, full.values), basis, table.grid)
+    return Textures(np.matmul(project, full.values), basis, table.tiles)
 
 
 def _mirror_texel(textures: Textures) -> Array:
-    """Computes the value (outputs,) of the first ring, which is one point."""
-    return np.asarray(samples(textures.values[:3])[0].mean(axis=1), dtype=np.float64)
+    """Computes the value (outputs,) of the first ring, which is one point; 0 where none of its tiles is covered."""
+    around = samples(textures.values[:3])[0][:, textures.tiles.mask()[0]]
+    return np.asarray(np.sum(around, axis=1) / max(around.shape[1], 1), dtype=np.float64)
 
 
 def _components(moments: Array, first: Array, count: int) -> Array:
@@ -188,20 +195,26 @@ def weighting_bytes(w_terms: int) -> int:
 def flattened(textures: Textures) -> Textures:
     """Divides textures by the envelope that fits them best, which narrows their range for half floats."""
     rho, nodes = textures.grid.rings.rho(), samples(textures.values)
-    envelope = _fit(rho, nodes)
-    values = cubic_spline.coefficients(nodes / envelope.at(rho).astype(np.float32)[:, None, None])
+    envelope = _fit(rho, nodes, textures.tiles.mask())
+    flat = nodes / envelope.at(rho).astype(np.float32)[:, None, None]
+    values = cubic_spline.coefficients(flat, textures.tiles.every_of_ring)
     return replace(textures, values=values, envelope=envelope)
 
 
-def _fit(rho: Array, nodes: NDArray[np.float32]) -> Envelope:
-    """Fits the envelope to the logarithm of the rings' root mean squares; nodes: (rings, outputs, azimuths)."""
-    size = np.sqrt(np.mean(nodes.astype(np.float64) ** 2, axis=(1, 2)))
+def _fit(rho: Array, nodes: NDArray[np.float32], covered: NDArray[np.bool_]) -> Envelope:
+    """Fits the envelope to the logarithm of the rings' root mean squares.
+
+    rho: (rings,). nodes: (rings, outputs, azimuths), of which those that are covered (rings, azimuths) count.
+    """
+    power = np.mean(nodes.astype(np.float64) ** 2, axis=1)
+    count = covered.sum(axis=1)
+    size = np.sqrt(np.sum(power, axis=1, where=covered)[count > 0] / count[count > 0])
     if not size.any():
         return Envelope()
     level = np.log(np.maximum(size, _BLACK * size.max()))
     # the smallest radius spans the four rings of a spline, so that g varies no faster than the samples
     radii = np.geomspace(rho[4], rho[-1], _ENVELOPE_RADII)
-    return min((_exponent(rho, level, radius) for radius in radii), key=lambda found: found[0])[1]
+    return min((_exponent(rho[count > 0], level, radius) for radius in radii), key=lambda found: found[0])[1]
 
 
 def _exponent(rho: Array, level: Array, radius: float) -> tuple[float, Envelope]:

@@ -4,20 +4,20 @@ A pair of light and view asks for one (u, v, w). Its look-up reads the four ring
 spline coefficients depend on samples further away: the filter's impulse response falls by 0.268 from texel to texel.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
-from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles, bands, sectors
+from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles, bands, sectors, thinned
 from pipeline.scene.model import Scene
 from pipeline.scene.visited import visited
 
-# from the texels beside a direction to those of its spline
+# knots from the texels beside a direction to those of its spline
 _TAPS = 2
-# texels between a look-up and the end of the samples: of the second difference there, 0.268^6 = 4e-4 remains
+# knots between a look-up and the end of the samples: of the second difference there, 0.268^6 = 4e-4 remains
 MARGIN = 6
 # samples of a scene's directions
 _SAMPLES = 200_000
@@ -40,11 +40,12 @@ class Reach:
 
     def tiles(self) -> Tiles:
         """Returns the tiles that hold all visited texels and those on which their coefficients depend."""
-        needed = _grown(self.texels, MARGIN)
+        all_tiles = thinned(self.grid)
+        needed = _grown(self.texels, MARGIN, all_tiles.every_of_ring)
         by_sector = needed.reshape(len(needed), sectors(self.grid), AZIMUTHS).any(axis=2)
         firsts = RINGS * np.arange(bands(self.grid))
         covered = np.maximum.reduceat(by_sector.astype(np.uint8), firsts, axis=0).astype(bool)
-        return Tiles(self.grid, covered, (1,) * bands(self.grid))
+        return replace(all_tiles, covered=covered)
 
 
 def reach(scene: Scene | None, grid: PolarGrid) -> Reach:
@@ -65,7 +66,7 @@ def of_directions(grid: PolarGrid, uvw: Array, gap: Array | float = 0.0) -> Reac
     if beside[0].any():
         # the first ring is one point
         beside[0] = True
-    return Reach(grid, _grown(beside, _TAPS))
+    return Reach(grid, _grown(beside, _TAPS, thinned(grid).every_of_ring))
 
 
 def _beside(grid: PolarGrid, uv: Array, gap: Array) -> NDArray[np.bool_]:
@@ -93,9 +94,9 @@ def known_cells(tiles: Tiles) -> NDArray[np.bool_]:
     """Marks the cells (rings, azimuths) in which a look-up is as good as with all tiles.
 
     Cell (i, j) lies between the rings i and i + 1 and the azimuths j and j + 1. Its look-up reads the four texels
-    along each axis about it, none of which is within MARGIN of a tile that is missing.
+    along each axis about it, none of which is within MARGIN knots of a tile that is missing.
     """
-    return ~_grown(~tiles.mask(), MARGIN + 2)
+    return ~_grown(~tiles.mask(), MARGIN + 2, tiles.every_of_ring)
 
 
 def w_of(wi: Array, uv: Array) -> Array:
@@ -127,13 +128,19 @@ def _unit(phi: Array) -> Array:
     return np.stack([np.cos(phi), np.sin(phi)], axis=-1)
 
 
-def _grown(mask: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
-    """Adds to a mask (rings, azimuths) what is within `by` texels of it, also across the first ring."""
+def _grown(mask: NDArray[np.bool_], by: int, every: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Adds to a mask (rings, azimuths) what is within `by` knots of it, also across the first ring.
+
+    every: azimuths from knot to knot of each ring (rings,).
+    """
     from scipy.ndimage import maximum_filter1d
 
     by_ring = min(by, len(mask) - 1)
     opposite = np.roll(mask[by_ring:0:-1], mask.shape[1] // 2, axis=1)
     grown = np.concatenate([opposite, mask]).astype(np.uint8)
-    maximum_filter1d(grown, 2 * by + 1, axis=1, mode="wrap", output=grown)
     maximum_filter1d(grown, 2 * by + 1, axis=0, mode="nearest", output=grown)
-    return np.asarray(grown[by_ring:], bool)
+    grown = grown[by_ring:]
+    for step in np.unique(every):
+        rows = every == step
+        grown[rows] = maximum_filter1d(grown[rows], 2 * by * int(step) + 1, axis=1, mode="wrap")
+    return np.asarray(grown, bool)

@@ -3,7 +3,8 @@
 XYZ / (C cos ti) = sum_k T_k(2 |w| / w_max - 1) table[ring, channel, k, azimuth],   w_max = sqrt(4 - rho^2)
 
 where `table` is interpolated by bicubic B-splines. |w| <= w_max on a ring, because -(u, v, w) is the sum of two unit
-vectors.
+vectors. Near the mirror direction a ring's spline has its knots at every second or fourth azimuth; in memory it is
+refined to all of them, and a bundle stores the coefficients that it is made from.
 """
 
 from collections.abc import Sequence
@@ -17,6 +18,7 @@ from kernels.chebyshev import w_max
 from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid, Rings
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
+from pipeline.diffraction.tiles import Tiles, thinned
 from pipeline.optics.brdf import Radiometry, geometry_factor
 from pipeline.optics.light import Quadrature
 from pipeline.tables.polar import spectral_integral
@@ -33,11 +35,16 @@ class PolarTable:
     """B-spline coefficients on a polar grid.
 
     values: float32 (rings, 3, w terms, azimuths): X, Y, Z and Chebyshev terms in |w|.
-    grid: the rings and azimuths.
+    tiles: of the grid, those that hold values, and the azimuths at which their splines have knots.
     """
 
     values: NDArray[np.float32]
-    grid: PolarGrid
+    tiles: Tiles
+
+    @property
+    def grid(self) -> PolarGrid:
+        """The rings and azimuths."""
+        return self.tiles.grid
 
     @property
     def nbytes(self) -> int:
@@ -50,19 +57,15 @@ class PolarTable:
         return int(self.values.shape[2])
 
     def look_up(self, uvw: Array) -> Array:
-        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the rings."""
+        """Computes XYZ / (C cos ti) (directions, 3) at `uvw` (directions, 3); NaN outside the covered tiles."""
         rings, azimuths = self.grid.rings, self.grid.azimuths
         rho = np.hypot(uvw[:, 0], uvw[:, 1])
-        ring = rings.ring_from_rho(rho)
-        inside = rho <= rings.rho_max * _RIM
-        place = (
-            np.clip(ring, 0.0, rings.count - 1.0),
-            azimuths.azimuth_from_uv(uvw[:, :2]),
-            w_position(rho, uvw[:, 2]),
-        )
+        ring = np.clip(rings.ring_from_rho(rho), 0.0, rings.count - 1.0)
+        azimuth = azimuths.azimuth_from_uv(uvw[:, :2])
+        covered = (rho <= rings.rho_max * _RIM) & self.tiles.covers(ring, azimuth)
         flat = self.values.reshape(rings.count, -1, azimuths.count)
-        found = cubic_spline.look_up(flat, *place).astype(np.float64)
-        found[~inside] = np.nan
+        found = cubic_spline.look_up(flat, ring, azimuth, w_position(rho, uvw[:, 2])).astype(np.float64)
+        found[~covered] = np.nan
         return found
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
@@ -83,10 +86,10 @@ def build(power: PolarPowerSpectrum, rings: Rings, integrands: Sequence[Integran
     Raises ResourceError if the spectral integral does not fit into memory.
     """
     of = power.values, power.radius_per_um, power.s_max_per_um, rings.rho()
-    tables = []
+    tiles, tables = thinned(PolarGrid(rings, power.azimuths)), []
     for samples in spectral_integral.integrate_all(*of, integrands, w_terms):
-        values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1)).reshape(samples.shape)
-        tables.append(PolarTable(values, PolarGrid(rings, power.azimuths)))
+        values = cubic_spline.coefficients(samples.reshape(rings.count, 3 * w_terms, -1), tiles.every_of_ring)
+        tables.append(PolarTable(values.reshape(samples.shape), tiles))
     return tables
 
 
@@ -104,8 +107,7 @@ def unknown_share(grid: PolarGrid, band_per_um: tuple[float, float], light: Quad
     grid: the rings and azimuths over whose disc the share is taken. band_per_um: the Nyquist limits (x, y), 1/um.
     light: wavelengths and weights, of which those of Y count.
     """
-    rho, phi = grid.rings.rho(), grid.azimuths.phi()
-    area = np.outer(rho * np.gradient(rho), np.abs(np.gradient(np.unwrap(phi))))
+    rho, phi, area = grid.rings.rho(), grid.azimuths.phi(), grid.area()
     # along each azimuth the Nyquist limit is r = reach, so wavelengths shorter than rho / reach are lost
     reach = np.minimum(
         band_per_um[0] / np.maximum(np.abs(np.cos(phi)), 1e-12),

@@ -254,7 +254,8 @@ def assemble(samples: Mapping[tuple[int, int], NDArray[np.float32]], tiles: Tile
     for (band, sector), tile in samples.items():
         values[RINGS * band : RINGS * band + len(tile), :, AZIMUTHS * sector : AZIMUTHS * (sector + 1)] = tile
     _fill(values, tiles.covered[: last + 1])
-    return TileTable(cubic_spline.coefficients(values), tiles, bake.primaries, bake.wi)
+    coefficients = cubic_spline.coefficients(values, tiles.every_of_ring[:rings])
+    return TileTable(coefficients, tiles, bake.primaries, bake.wi)
 
 
 def _fill(values: NDArray[np.float32], covered: NDArray[np.bool_]) -> None:

@@ -2,7 +2,8 @@
 
 The errors of three tables at test directions give the coefficients of e^2 = a / rings^8 + b / azimuths^8 + c: cubic
 splines err by the fourth power of the distance of their knots. The search minimises rings times azimuths under this
-model and measures the error of the grids that it proposes.
+model and measures the error of the grids that it proposes. Of those that keep the budget it takes the one with the
+fewest texels, since innermost bands keep a part of the azimuths.
 """
 
 from functools import cached_property
@@ -11,7 +12,8 @@ from math import asinh, ceil, sqrt
 import numpy as np
 
 from pipeline import resources
-from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.tiles import AZIMUTHS, thinned
 from pipeline.optics.coherence import FLANK_DELTA_E, lobe_width
 from pipeline.scene.model import Scene
 from pipeline.tables.polar.bake import PolarBake
@@ -162,6 +164,10 @@ class GridSearch:
         kept = (one for one in _DISTANCES if probes.largest_error(one * lobe) <= _FLANK_SHARE * FLANK_DELTA_E)
         return next(kept, _DISTANCES[-1])
 
+    def _texels(self, numbers: tuple[int, int]) -> int:
+        rings, azimuths = numbers
+        return thinned(PolarGrid(self._grids.rings(rings), self._azimuths(azimuths))).texels
+
     def _azimuths(self, count: int) -> Azimuths:
         return Azimuths(count, self._stretch, self._axis)
 
@@ -205,7 +211,7 @@ class GridSearch:
         # numbers that the config sets were varied for the model only
         allowed = {pair: errors[pair] for pair in errors if pair == self._grids.clipped(*pair)}
         met = [pair for pair in allowed if allowed[pair] <= target]
-        best = min(met, key=lambda pair: pair[0] * pair[1]) if met else min(allowed, key=allowed.__getitem__)
+        best = min(met, key=self._texels) if met else min(allowed, key=allowed.__getitem__)
         return *best, allowed[best]
 
     @cached_property
@@ -235,5 +241,5 @@ def _share(growth: float, other: int, here: int) -> float:
 
 
 def _whole_tiles(azimuths: int) -> int:
-    """Rounds up to whole tiles of every fourth azimuth, so that coarser grids are part of the same gather."""
-    return 4 * TILE * ceil(azimuths / (4 * TILE))
+    """Rounds up to whole sectors, of which a band may keep every fourth azimuth."""
+    return AZIMUTHS * ceil(azimuths / AZIMUTHS)

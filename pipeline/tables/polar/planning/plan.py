@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from math import ceil
 
 from pipeline.diffraction import expansion, power_spectrum
-from pipeline.diffraction.polar_grid import Azimuths, Rings
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
+from pipeline.diffraction.tiles import thinned
 from pipeline.optics.brdf import Radiometry
 from pipeline.optics.light import LaserLine, Light
 from pipeline.optics.material import Material
@@ -66,7 +67,7 @@ class Plan:
     @property
     def texels(self) -> int:
         """Number of texels of one output of the table."""
-        return self.rings.count * self.azimuths.count
+        return thinned(PolarGrid(self.rings, self.azimuths)).texels
 
     def bake(self, radiometry: Radiometry, budget: Budget, layout: PolarLayout) -> PolarBake:
         """Makes the settings of a bake by this plan.
