@@ -37,6 +37,7 @@ def render_command(
     from pipeline.optics.colour import pixels
     from pipeline.report import images
     from pipeline.scene.lights import Direction
+    from pipeline.scene.maps import map_radius
     from pipeline.stages import render
     from pipeline.store import scratch
     from pipeline.store.store import writing
@@ -49,7 +50,7 @@ def render_command(
     folder, unit, made = out / config.name, config.radiometry.unit, []
     with console.showing_progress() as progress:
         evaluate = sources.config_evaluator(config, exact, store_root, progress)
-        pixels_of = [Map(size or config.render.size, render.map_radius(config, light)) for light in lights]
+        pixels_of = [Map(size or config.render.size, map_radius(config.scene, light)) for light in lights]
         shown = [
             render_map(evaluate, render.light_direction(light), views)
             for light, views in zip(lights, pixels_of, strict=True)

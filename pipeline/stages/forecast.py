@@ -51,12 +51,13 @@ class Prospect:
     """A bake before it begins.
 
     needs: of every stage, by name. written: bytes of every artifact. delta_e: mean CIELAB error of the table; None
-    where nothing is known of it.
+    where nothing is known of it. kept_share: of the table's texels, that a bundle holds.
     """
 
     needs: Mapping[str, Need]
     written: Mapping[str, int]
     delta_e: float | None
+    kept_share: float = 1.0
 
 
 def outcome(config: Config, made: Mapping[str, Summary]) -> Prospect:
@@ -66,7 +67,8 @@ def outcome(config: Config, made: Mapping[str, Summary]) -> Prospect:
         return Prospect({}, {}, None)
     foreseen = Foreseen(config, extent, made)
     sizes = layouts.of(config.table).sizes(foreseen)
-    return Prospect(_needs(foreseen, sizes), _written(foreseen, sizes), sizes.delta_e)
+    kept = sizes.kept_share()
+    return Prospect(_needs(foreseen, sizes), _written(foreseen, sizes, kept), sizes.delta_e, kept)
 
 
 def _extent(config: Config, made: Mapping[str, Summary], *, reads: bool) -> Extent | None:
@@ -83,10 +85,10 @@ def _extent(config: Config, made: Mapping[str, Summary], *, reads: bool) -> Exte
         return None
 
 
-def _written(foreseen: Foreseen, sizes: LayoutSizes) -> dict[str, int]:
-    """Estimates the bytes of every artifact."""
+def _written(foreseen: Foreseen, sizes: LayoutSizes, kept: float) -> dict[str, int]:
+    """Estimates the bytes of every artifact; kept: share of the table's texels that a bundle holds."""
     config, layout = foreseen.config, layouts.of(foreseen.config.table)
-    lights, stored = len(config.render.lights), sizes.stored_bytes // 3
+    lights, stored = len(config.render.lights), round(kept * sizes.stored_bytes / 3)
     maps = lights * config.render.size**2 * _PIXEL_BYTES
     report = _REPORT_BYTES + lights * _REPORTED_MAP_BYTES
     return {
@@ -96,7 +98,7 @@ def _written(foreseen: Foreseen, sizes: LayoutSizes) -> dict[str, int]:
         layout.textures.name: stored,
         "render": maps,
         "validate": report,
-        "bundle": round(_COMPRESSED * (stored or sizes.table_bytes)) + maps + report,
+        "bundle": round(_COMPRESSED * (stored or kept * sizes.table_bytes)) + maps + report,
     }
 
 

@@ -1,6 +1,6 @@
 """The values from which memory and time of the stages are computed before they begin."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import floor, log10
@@ -80,6 +80,7 @@ class LayoutSizes:
     textures: of this stage, in addition to the table. stored_bytes: of the textures, 0 where they are the table.
     delta_e: mean CIELAB error expected of the table; None where nothing is known of it.
     study: of the curves of `validate`, in addition to the table. prepared: of a bundle's images, likewise.
+    kept_share: computes the share of the table's texels that a bundle holds.
     """
 
     transform: Need
@@ -93,6 +94,7 @@ class LayoutSizes:
     prepared: Need
     written_bytes: int = 0
     delta_e: float | None = None
+    kept_share: Callable[[], float] = lambda: 1.0
 
 
 @dataclass(frozen=True)

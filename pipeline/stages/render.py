@@ -13,7 +13,7 @@ from pipeline.progress import Progress
 from pipeline.report import images
 from pipeline.resources import Need, largest
 from pipeline.scene.lights import Direction
-from pipeline.scene.visited import rho_max
+from pipeline.scene.maps import map_radius
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.stage import Inputs, Stage, Summary, light_parameters, material_parameters
 from pipeline.tables.evaluate import Map, interpolator, look_up_bytes, map_bytes, never_negative, render_map
@@ -37,24 +37,12 @@ def map_name(light: Direction) -> str:
     return f"map_theta{light.theta_deg:.12g}_phi{light.phi_deg:.12g}"
 
 
-def map_radius(config: Config, light: Direction) -> float:
-    """Computes the radius of a light's map, sin(theta) of its outermost views: as far as the table reaches.
-
-    That is the scene's theta_max on a flat sample, and what its largest |(u, v)| leaves where cameras see it.
-    """
-    if config.scene is None:
-        return 1.0
-    if config.scene.cameras is None:
-        return float(np.sin(np.radians(config.scene.views.theta_max_deg)))
-    return float(min(1.0, rho_max(config.scene) - np.sin(np.radians(light.theta_deg))))
-
-
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     interpolate = interpolator(layouts.of(config.table).stored_of(inputs), config.radiometry)
     unit = config.radiometry.unit
     maps = []
     for i, light in enumerate(config.render.lights):
-        views = Map(config.render.size, map_radius(config, light))
+        views = Map(config.render.size, map_radius(config.scene, light))
         interpolated = render_map(interpolate, light_direction(light), views)
         image = never_negative(interpolated)
         stem = map_name(light)

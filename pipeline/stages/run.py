@@ -95,6 +95,8 @@ def explain(config: Config, steps: list[Step], store: Store) -> list[Explanation
         seconds = None if need is None else machine.seconds(name, need)
         error = foreseen.delta_e if name == "table" else None
         work = step.stage.work(config)
+        if name == "table" and foreseen.kept_share < 1.0:
+            work = f"{work}, {100.0 * foreseen.kept_share:.0f} % of the texels kept"
         explanations.append(Explanation(reason, work, need, seconds, foreseen.written.get(name), error))
     return explanations
 

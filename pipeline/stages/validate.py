@@ -14,6 +14,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.reference import Reference
 from pipeline.progress import Progress
 from pipeline.resources import Need, largest
+from pipeline.scene.maps import map_radius
 from pipeline.stages import render, surface
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, heap, spare
 from pipeline.stages.layout import Layout
@@ -59,7 +60,7 @@ def _measured(
     evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
     reference = surface.reference_of(config, inputs, progress)
     exposures = (config.render.exposure_ru, config.accuracy.exposure_ru)
-    radii = [render.map_radius(config, light) for light in config.render.lights]
+    radii = [map_radius(config.scene, light) for light in config.render.lights]
     studied, compute = _name_of_curves(layout, config, inputs), partial(_curves, layout, config, inputs, baked)
     curves = inputs.session.derived(studied, lambda: compute(reference, progress)).value
     drawn["convergence"] = drawing.submit(_once, inputs, f"plot of {studied}", "convergence", curves, exposures[1])
@@ -107,9 +108,7 @@ def _curves(
 ) -> Small[list[convergence.Curve]]:
     """Computes the error against each setting of the table, on a coarse map under the first light."""
     studied, first = layout.studied(config), config.render.lights[0]
-    coarse = convergence.CoarseMap(
-        reference, studied, render.light_direction(first), render.map_radius(config, first)
-    )
+    coarse = convergence.CoarseMap(reference, studied, render.light_direction(first), map_radius(config.scene, first))
     study, curves = layout.study(studied, inputs, baked, coarse), []
     for i, setting in enumerate(study):
         curves.append(setting())

@@ -282,6 +282,7 @@ def test_textures_must_be_a_positive_number(textures: object) -> None:
 def test_a_scenes_bundle_states_the_skipped_share(bake: Baker, tmp_path: Path) -> None:
     config = small("polar", scene=SCENE, render={"lights": SCENE["lights"]}, publish={"textures": 3})
     manifest = manifest_of(publish(config, bake(config), tmp_path))
-    assert manifest.coverage.skipped_share == pytest.approx(1.0 - (grid_of(manifest).rho_max / 2.0) ** 2)
+    grid = grid_of(manifest)
+    assert manifest.coverage.skipped_share == pytest.approx(1.0 - grid.covered_share * (grid.rho_max / 2.0) ** 2)
     assert manifest.coverage.skipped_share > 0.3
     assert loss_of(manifest).error.mean < 10.0

@@ -1,6 +1,7 @@
 """Memory and time of the polar layout's stages, from the sizes of their arrays."""
 
 from dataclasses import replace
+from functools import partial
 from math import sqrt
 
 from pipeline import resources
@@ -8,10 +9,10 @@ from pipeline.accuracy.checks import certified_directions, random_directions
 from pipeline.bundle.polar import storage
 from pipeline.diffraction import dft_stack
 from pipeline.diffraction import power_spectrum as spectrum
-from pipeline.diffraction.polar_grid import Rings
+from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.resources import Arrays, Need, largest
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, base, process, spare
-from pipeline.stages.polar import power_spectrum
+from pipeline.stages.polar import power_spectrum, table
 from pipeline.store.arrays import loading_bytes, saving_bytes
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.bake import PolarBake
@@ -69,7 +70,14 @@ def sizes(foreseen: Foreseen) -> LayoutSizes:
         ),
         written_bytes=e_bytes,
         delta_e=_expected_delta_e(foreseen),
+        kept_share=partial(_kept_share, foreseen, rings, azimuths),
     )
+
+
+def _kept_share(foreseen: Foreseen, rings: Rings, azimuths: int) -> float:
+    """Computes the share of the texels that lie in tiles of the scene, less the thinned ones; without a stretch."""
+    grid = PolarGrid(rings, Azimuths(azimuths))
+    return table.reached(foreseen.config, grid).texels / grid.texels
 
 
 def _expected_delta_e(foreseen: Foreseen) -> float | None:

@@ -1,6 +1,6 @@
 """The stage "table": power spectrum, light and material -> the polar table of XYZ, with its certificate."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
-from pipeline.diffraction.tiles import Tiles
+from pipeline.diffraction.tiles import Tiles, thinned
 from pipeline.progress import Progress
+from pipeline.scene.maps import map_scene
 from pipeline.stages import surface
 from pipeline.stages.polar import certificate, power_spectrum
 from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest
@@ -17,6 +18,7 @@ from pipeline.store import arrays
 from pipeline.store.store import Artifact
 from pipeline.tables.evaluate import interpolator
 from pipeline.tables.polar import table as polar
+from pipeline.tables.polar.reach import reach
 
 _FILE = "table.zarr"
 
@@ -26,6 +28,8 @@ def _parameters(config: Config) -> dict[str, Any]:
         "kernels": kernel_digest(*power_spectrum.PLANNING_KERNELS, "exact_power.cl"),
         # of the certificate, which measures colours and so depends on the whole material
         **colour_parameters(config),
+        # which a scene's table serves as well
+        "maps": None if config.scene is None else [light.model_dump() for light in config.render.lights],
     }
 
 
@@ -34,7 +38,8 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     plan = power_spectrum.planned(inputs["power_spectrum"])
     bake = plan.bake(config.radiometry, power_spectrum.budget(config), power_spectrum.layout_of(config))
     rules = bake.rules(plan.rings.rho())
-    table = bake.table(power, plan.rings, rules)
+    made = bake.table(power, plan.rings, rules)
+    table = replace(made, tiles=reached(config, made.grid))
     progress("table", 1.0)
     light = config.radiometry.illumination(config.table.mean_step_nm)
     unknown = polar.unknown_share(table.grid, power.band_per_um, light)
@@ -73,6 +78,15 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     }
 
 
+def reached(config: Config, grid: PolarGrid) -> Tiles:
+    """Returns the tiles of a grid that the scene of a config and the maps of its [render] reach; all without one."""
+    if config.scene is None:
+        return thinned(grid)
+    scenes = [config.scene, *(map_scene(config.scene, light) for light in config.render.lights)]
+    found = [reach(scene, grid).tiles() for scene in scenes]
+    return replace(found[0], covered=np.logical_or.reduce([tiles.covered for tiles in found]))
+
+
 def of(inputs: Inputs) -> polar.PolarTable:
     """Returns the table of a stage's inputs."""
     return inputs.shared("table", load)
@@ -95,4 +109,4 @@ def _work(config: Config) -> str:
     return f"{layout.rings} rings x {layout.azimuths} azimuths"
 
 
-TABLE = Stage("table", 8, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)
+TABLE = Stage("table", 9, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)

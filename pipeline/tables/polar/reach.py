@@ -42,9 +42,8 @@ class Reach:
         """Returns the tiles that hold all visited texels and those on which their coefficients depend."""
         all_tiles = thinned(self.grid)
         needed = _grown(self.texels, MARGIN, all_tiles.every_of_ring)
-        by_sector = needed.reshape(len(needed), sectors(self.grid), AZIMUTHS).any(axis=2)
-        firsts = RINGS * np.arange(bands(self.grid))
-        covered = np.maximum.reduceat(by_sector.astype(np.uint8), firsts, axis=0).astype(bool)
+        by_band = np.logical_or.reduceat(needed, RINGS * np.arange(bands(self.grid)), axis=0)
+        covered = np.logical_or.reduceat(by_band, AZIMUTHS * np.arange(sectors(self.grid)), axis=1)
         return replace(all_tiles, covered=covered)
 
 
