@@ -1,13 +1,15 @@
 """The views of a map, which shows one light: as far as a scene's table reaches."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from pipeline.scene.lights import Direction, Parallel
+from pipeline.scene.lights import Direction, Parallel, SceneLight
 from pipeline.scene.model import Scene, Views
 from pipeline.scene.visited import rho_max
 
-# the least cone of views that a scene may have
-_LEAST_DEG = 0.1
+# the least cone of views, and the most lights, that a scene may have
+_LEAST_DEG, _MOST_LIGHTS = 0.1, 256
 
 
 def map_radius(scene: Scene | None, light: Direction) -> float:
@@ -22,8 +24,19 @@ def map_radius(scene: Scene | None, light: Direction) -> float:
     return float(min(1.0, rho_max(scene) - np.sin(np.radians(light.theta_deg))))
 
 
-def map_scene(scene: Scene, light: Direction) -> Scene:
-    """Returns what a light's map shows of a scene, as a scene of its own."""
-    widest = float(np.degrees(np.arcsin(max(map_radius(scene, light), 0.0))))
-    towards = Parallel(theta_deg=light.theta_deg, phi_deg=light.phi_deg)
-    return Scene(lights=[towards], views=Views(theta_max_deg=max(widest, _LEAST_DEG)))
+def map_scenes(scene: Scene, lights: Sequence[Direction]) -> list[Scene]:
+    """Returns what the maps of some lights show of a scene, as scenes of as many lights as one may have."""
+    by_radius: dict[float, list[SceneLight]] = {}
+    for light in lights:
+        towards = Parallel(theta_deg=light.theta_deg, phi_deg=light.phi_deg)
+        by_radius.setdefault(map_radius(scene, light), []).append(towards)
+    return [
+        Scene(lights=parallel[first : first + _MOST_LIGHTS], views=_views(radius))
+        for radius, parallel in by_radius.items()
+        for first in range(0, len(parallel), _MOST_LIGHTS)
+    ]
+
+
+def _views(radius: float) -> Views:
+    widest = float(np.degrees(np.arcsin(max(radius, 0.0))))
+    return Views(theta_max_deg=max(widest, _LEAST_DEG))

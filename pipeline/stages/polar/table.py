@@ -10,7 +10,7 @@ from pipeline.config.models import Config
 from pipeline.diffraction.polar_grid import Azimuths, PolarGrid, Rings
 from pipeline.diffraction.tiles import Tiles, thinned
 from pipeline.progress import Progress
-from pipeline.scene.maps import map_scene
+from pipeline.scene.maps import map_scenes
 from pipeline.stages import surface
 from pipeline.stages.polar import certificate, power_spectrum
 from pipeline.stages.stage import Inputs, Stage, Summary, colour_parameters, kernel_digest
@@ -82,7 +82,7 @@ def reached(config: Config, grid: PolarGrid) -> Tiles:
     """Returns the tiles of a grid that the scene of a config and the maps of its [render] reach; all without one."""
     if config.scene is None:
         return thinned(grid)
-    scenes = [config.scene, *(map_scene(config.scene, light) for light in config.render.lights)]
+    scenes = [config.scene, *map_scenes(config.scene, config.render.lights)]
     found = [reach(scene, grid).tiles() for scene in scenes]
     return replace(found[0], covered=np.logical_or.reduce([tiles.covered for tiles in found]))
 
