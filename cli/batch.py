@@ -11,6 +11,7 @@ from cli import console, sources
 if TYPE_CHECKING:
     from pipeline.batch.turns import Turn
     from pipeline.config.models import Config
+    from pipeline.stages.run import Step
 
 _SUMMARY = ("config", "verdict", "mean dE", "seconds", "made", "cached", "result")
 
@@ -28,12 +29,12 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
     from pipeline.store import scratch
 
     store = console.open_store(store_root)
-    loaded = load_all(paths, store, until)
+    planned = plan_all(paths, store, until)
     if until in ("validate", "bundle"):
-        for config in loaded:
+        for config, _ in planned:
             scratch.require_folder(out / config.name)
-    baked = {turn.config.name: _bake(turn, out, store, until) for turn in turns(loaded, store, until)}
-    results = [baked[config.name] for config in loaded]
+    baked = {turn.config.name: _bake(turn, out, store, until) for turn in turns(planned)}
+    results = [baked[config.name] for config, _ in planned]
     if as_json:
         console.print_json(results)
     elif len(results) > 1:
@@ -48,8 +49,8 @@ def bake_all(paths: tuple[Path, ...], out: Path, store_root: Path | None, as_jso
         raise click.exceptions.Exit(errors[0]["code"])
 
 
-def load_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[Config]":
-    """Loads configs, and checks those of which a stage is to do before any work starts.
+def plan_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[tuple[Config, list[Step]]]":
+    """Loads configs and plans their bakes, and checks those of which a stage is to do before any work starts.
 
     store: where artifacts are looked for. until: name of the last stage.
     Raises ConfigError for faults, and for two configs of one name, which would share a folder.
@@ -64,10 +65,11 @@ def load_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[Config]":
         if config.name in seen:
             raise ConfigError(str(path), [("name", f"{config.name!r} is also the name of {seen[config.name][1]}")])
         seen[config.name] = config, path
-    for config, path in seen.values():
-        if not all(step.cached for step in run.plan(config, store, until)):
-            sources.check(config, path)
-    return [config for config, _ in seen.values()]
+    planned = [(config, run.plan(config, store, until)) for config, _ in seen.values()]
+    for config, steps in planned:
+        if not all(step.cached for step in steps):
+            sources.check(config, seen[config.name][1])
+    return planned
 
 
 def _bake(turn: "Turn", out: Path, store: Any, until: str) -> dict[str, Any]:
@@ -107,12 +109,12 @@ def _make(turn: "Turn", out: Path, store: Any, until: str, result: dict[str, Any
 
     with console.showing_progress() as progress:
         if until == "bundle":
-            made, bundle = bake.make(config, store, out / config.name, progress, on_step, turn.session)
+            made, bundle = bake.make(config, turn.steps, store, out / config.name, progress, on_step, turn.session)
             result["bundle"] = str(bundle)
         elif until == "validate":
-            made = bake.validate(config, store, out / config.name, progress, on_step, turn.session)
+            made = bake.validate(config, turn.steps, store, out / config.name, progress, on_step, turn.session)
         else:
-            run.execute(config, run.plan(config, store, until), store, progress, on_step, turn.session)
+            run.execute(config, turn.steps, store, progress, on_step, turn.session)
             return None
     result["files"] = [str(path) for path in made.files]
     return made.missed_budget

@@ -117,7 +117,7 @@ def execute(
     none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
-    device = _Device() if any(step.stage.uses_device and not step.cached for step in steps) else None
+    device = _Device() if _uses_device(steps, store) else None
     if device is not None:
         device.start()
     opened: dict[str, Artifact] = {}
@@ -142,6 +142,11 @@ def execute(
         if on_step is not None:
             on_step(step, seconds)
     return {name: store.describe(name, key) for name, key in keys.items()}
+
+
+def _uses_device(steps: list[Step], store: Store) -> bool:
+    """Says whether a step that is to do uses a device; other runs may have made artifacts since the plan."""
+    return any(step.stage.uses_device and not store.has(step.stage.name, step.key) for step in steps)
 
 
 class _Device(Thread):
