@@ -37,7 +37,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     section = {**config.surface.model_dump(mode="json"), "level": config.surface.levelling}
     if config.surface.path is not None:
         require_file(Path(config.surface.path))
-        section["path"] = {"sha256": digest.of_file(Path(config.surface.path))}
+        section["path"] = {"sha256": digest.of_source(Path(config.surface.path))}
     # the statistics depend on the window and the shortest wavelength
     return {
         "surface": section,
@@ -49,6 +49,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     progress("surface", 0.0)
     field, cleaning, scan = field_of(config)
+    _require_unchanged(config, inputs)
     lambda_min = config.light.lambda_min_nm
     statistics = measure(field, config.coherence.sigma_um, lambda_min)
     x, y = field.coordinates_um()
@@ -73,6 +74,12 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
             *_warnings(statistics, config.coherence.sigma_um, lambda_min, is_scan=scan is not None),
         ],
     }
+
+
+def _require_unchanged(config: Config, inputs: Inputs) -> None:
+    """Raises InputError where the scan is no longer the one that was planned for, whose digest is in the address."""
+    if SURFACE.key(config, {}) != inputs.address:
+        raise InputError(f"{config.surface.path}: the scan has changed since the bake began; bake it again")
 
 
 def field_of(config: Config) -> tuple[HeightField, ConditioningRecord, dict[str, Any] | None]:
