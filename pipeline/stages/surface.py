@@ -105,7 +105,8 @@ def field_of(config: Config) -> tuple[HeightField, ConditioningRecord, dict[str,
 def need(source: SurfaceSource, extent: Extent, lambda_min_nm: float) -> Need:
     """Computes memory and time of this stage from its samples.
 
-    A recipe is made, or a scan conditioned in five arrays; then the conditioned field is measured.
+    A recipe is made, or a scan conditioned in five arrays, fewer where nothing is filled or clipped; then the
+    conditioned field is measured.
     """
     making = 5 * extent.bytes if source.recipe is None else recipes.making_bytes(source.recipe, extent.samples)
     measuring = measuring_bytes(extent, lambda_min_nm)
@@ -190,4 +191,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 9, (), _parameters, _produce)
+SURFACE = Stage("surface", 10, (), _parameters, _produce)
