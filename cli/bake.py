@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cli import console, explain
-from cli.batch import bake_all, load_all
+from cli.batch import bake_all, plan_all
 
 if TYPE_CHECKING:
     from pipeline.config.models import Config
@@ -59,7 +59,7 @@ def plan_command(config_paths: tuple[Path, ...], store_root: Path | None, as_jso
     from pipeline.stages import run
 
     store = console.open_store(store_root)
-    planned = [(config, run.plan(config, store)) for config in load_all(config_paths, store, "bundle")]
+    planned = plan_all(config_paths, store, "bundle")
     plans = {config.name: _explained(config, steps, store) for config, steps in planned}
     if as_json:
         console.print_json(plans)

@@ -11,6 +11,7 @@ from cli import console, explain, sources
 if TYPE_CHECKING:
     from pipeline.batch.turns import Turn
     from pipeline.config.models import Config
+    from pipeline.stages.run import Step
 
 _SUMMARY = ("config", "verdict", "mean dE", "seconds", "made", "cached", "result")
 
@@ -31,14 +32,12 @@ def bake_all(
     from pipeline.store import scratch
 
     store = console.open_store(store_root)
-    loaded = load_all(paths, store, until)
+    planned = plan_all(paths, store, until)
     if until in ("validate", "bundle"):
-        for config in loaded:
+        for config, _ in planned:
             scratch.require_folder(out / config.name)
-    baked = {
-        turn.config.name: _bake(turn, out, store, until, explains=explains) for turn in turns(loaded, store, until)
-    }
-    results = [baked[config.name] for config in loaded]
+    baked = {turn.config.name: _bake(turn, out, store, until, explains=explains) for turn in turns(planned, store)}
+    results = [baked[config.name] for config, _ in planned]
     if explains and not as_json:
         for result in results:
             explain.show(result)
@@ -56,8 +55,8 @@ def bake_all(
         raise click.exceptions.Exit(errors[0]["code"])
 
 
-def load_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[Config]":
-    """Loads configs, and checks those of which a stage is to do before any work starts.
+def plan_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[tuple[Config, list[Step]]]":
+    """Loads configs and plans their bakes, and checks those of which a stage is to do before any work starts.
 
     store: where artifacts are looked for. until: name of the last stage.
     Raises ConfigError for faults, and for two configs of one name, which would share a folder.
@@ -72,10 +71,11 @@ def load_all(paths: tuple[Path, ...], store: Any, until: str) -> "list[Config]":
         if config.name in seen:
             raise ConfigError(str(path), [("name", f"{config.name!r} is also the name of {seen[config.name][1]}")])
         seen[config.name] = config, path
-    for config, path in seen.values():
-        if not all(step.cached for step in run.plan(config, store, until)):
-            sources.check(config, path)
-    return [config for config, _ in seen.values()]
+    planned = [(config, run.plan(config, store, until)) for config, _ in seen.values()]
+    for config, steps in planned:
+        if not all(step.cached for step in steps):
+            sources.check(config, seen[config.name][1])
+    return planned
 
 
 def _bake(turn: "Turn", out: Path, store: Any, until: str, *, explains: bool) -> dict[str, Any]:
@@ -107,7 +107,7 @@ def _make(turn: "Turn", out: Path, store: Any, until: str, result: dict[str, Any
     from pipeline.stages import bake, run
 
     config, report = turn.config, console.step_reporter(turn.config, store)
-    explained = explain.Explained(turn, store, until) if explains else None
+    explained = explain.Explained(turn, store) if explains else None
 
     def on_step(step: Any, seconds: float | None) -> None:
         report(step, seconds)
@@ -119,12 +119,12 @@ def _make(turn: "Turn", out: Path, store: Any, until: str, result: dict[str, Any
 
     with console.showing_progress() as progress:
         if until == "bundle":
-            made, bundle = bake.make(config, store, out / config.name, progress, on_step, turn.session)
+            made, bundle = bake.make(config, turn.steps, store, out / config.name, progress, on_step, turn.session)
             result["bundle"] = str(bundle)
         elif until == "validate":
-            made = bake.validate(config, store, out / config.name, progress, on_step, turn.session)
+            made = bake.validate(config, turn.steps, store, out / config.name, progress, on_step, turn.session)
         else:
-            run.execute(config, run.plan(config, store, until), store, progress, on_step, turn.session)
+            run.execute(config, turn.steps, store, progress, on_step, turn.session)
             return None
     result["files"] = [str(path) for path in made.files]
     return made.missed_budget

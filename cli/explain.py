@@ -15,11 +15,11 @@ _COLUMNS = ("stage", "predicted", "actual", "bytes predicted", "actual", "peak p
 class Explained:
     """The predictions of a config's stages, made before the first one runs, and what the run then took."""
 
-    def __init__(self, turn: "Turn", store: "Store", until: str) -> None:
-        """Predicts all stages of a config up to `until`, as if it were alone."""
+    def __init__(self, turn: "Turn", store: "Store") -> None:
+        """Predicts all stages of a config's plan, as if it were alone."""
         from pipeline.stages import run
 
-        config, steps = turn.config, run.plan(turn.config, store, until)
+        config, steps = turn.config, turn.steps
         # what a config does not compute because another did says nothing of one that is alone
         self._is_alone = turn.session.derived_bytes == 0
         self._store = store

@@ -89,7 +89,7 @@ class FactoredAxis:
         """Vectors of scratch that a work-item needs, with `groups` of them in a line of terms."""
         folded, length = max(level.folded for level in self.levels), 8 * ceil(self.inner / 8)
         heights = groups * ceil(length * self.levels[2].points / 8)
-        return 2 * groups * self.inner * self.stride + groups * length + 2 * self.inner + folded + heights
+        return 2 * groups * self.inner * self.stride + groups * length + 2 * self.inner + groups * folded + heights
 
     def sizes(self) -> NDArray[np.int32]:
         """The kernels' Axis."""

@@ -1,6 +1,8 @@
 """Memory behind the arrays that kernels read and write."""
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ class MemoryPool:
 
     def __init__(self) -> None:
         self._spare: list[np.ndarray] = []
+        self._keepers = 0
         # collecting garbage may free pages while pages are being taken
         self._lock = threading.RLock()
 
@@ -29,18 +32,38 @@ class MemoryPool:
         return array
 
     def take(self, bytes_: int) -> np.ndarray:
-        """Return spare memory of `bytes_` to twice that, or else new memory of `bytes_`."""
+        """Return the smallest spare memory of `bytes_` to twice that, or else new memory of `bytes_`."""
         with self._lock:
             fitting = (i for i, spare in enumerate(self._spare) if bytes_ <= spare.nbytes <= 2 * bytes_)
-            i = next(fitting, None)
+            i = min(fitting, key=lambda i: self._spare[i].nbytes, default=None)
             return np.empty(bytes_, np.uint8) if i is None else self._spare.pop(i)
 
     def give(self, memory: np.ndarray) -> None:
         """Keep memory for later; the oldest goes where the pool holds too much."""
         with self._lock:
             self._spare.append(memory)
-            while sum(spare.nbytes for spare in self._spare) > MOST_SPARE_BYTES:
-                self._spare.pop(0)
+            self._drop()
+
+    @contextmanager
+    def keeping(self) -> Iterator[None]:
+        """Let no memory go while this lasts: what follows takes arrays of the same sizes again and again."""
+        with self._lock:
+            self._keepers += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._keepers -= 1
+                self._drop()
+
+    @property
+    def spare_bytes(self) -> int:
+        """Bytes that nothing refers to."""
+        return sum(spare.nbytes for spare in self._spare)
+
+    def _drop(self) -> None:
+        while not self._keepers and self.spare_bytes > MOST_SPARE_BYTES:
+            self._spare.pop(0)
 
 
 class _Pages:

@@ -96,7 +96,7 @@ def bake(
     be written.
     """
     from pipeline.stages import bake as baking
-    from pipeline.stages import config_check
+    from pipeline.stages import config_check, run
     from pipeline.store import scratch
     from pipeline.store.store import Store, users_folder
 
@@ -112,7 +112,7 @@ def bake(
     scratch.require_folder(folder)
     opened = Store(users_folder() if store is None else Path(store))
     with resources.allowing(resources.bytes_of(memory) if isinstance(memory, str) else memory):
-        made, bundle = baking.make(config, opened, folder, progress)
+        made, bundle = baking.make(config, run.plan(config, opened), opened, folder, progress)
     if made.missed_budget is not None:
         raise AccuracyError(made.missed_budget)
     *maps, report = made.files

@@ -382,18 +382,27 @@ __kernel void along_x(__global const double *heights, const double scale, const 
     }
 }
 
-/* A coefficient's real and imaginary parts, which are `terms` apart; the first `lit` lanes of either. Those of a later
- * strip are added to what is there. */
-static INLINE void store_terms(const VECTOR re, const VECTOR im, const int lit, const int terms, const int strip,
+/* A coefficient's real and imaginary parts, which are `terms` apart; the first `lit` terms of either. Those of a later
+ * strip are added to what is there. Whole lines of the cache are written one after the other. */
+static INLINE void store_terms(VECTOR (*of)[PARTS], const int sign, const int lit, const int terms, const int strip,
                                __global REAL *to) {
-    if (lit == WIDTH && terms % WIDTH == 0) {
-        __global VECTOR *real = (__global VECTOR *)to, *imaginary = (__global VECTOR *)(to + terms);
-        STREAM(strip ? *real + re : re, real);
-        STREAM(strip ? *imaginary + im : im, imaginary);
-    } else ROLLED for (int n = 0; n < lit; ++n) {
-        to[n] = (strip ? to[n] : 0) + ((const REAL *)&re)[n];
-        to[terms + n] = (strip ? to[terms + n] : 0) + ((const REAL *)&im)[n];
+    UNROLL for (int part = 0; part < PARTS; ++part, to += terms) {
+        const int negative = part == 1 && sign < 0;
+        if (lit == TERMS && terms % TERMS == 0) UNROLL for (int g = 0; g < GROUPS; ++g) {
+            __global VECTOR *at = (__global VECTOR *)to + g;
+            const VECTOR value = negative ? -of[g][part] : of[g][part];
+            if (strip) *at += value;
+            else STREAM(value, at);
+        } else ROLLED for (int n = 0; n < lit; ++n) {
+            const REAL value = ((const REAL *)&of[n / WIDTH][part])[n % WIDTH];
+            to[n] = (strip ? to[n] : 0) + (negative ? -value : value);
+        }
     }
+}
+
+/* Where the stack holds a coefficient of phi >= 0, or its negative where `side` is 1. */
+static long place_of(const int row, const int phi, const int side, const int rows, const int reach, const long width) {
+    return side ? (rows - 1 - row) * width + reach - phi : row * width + reach + phi;
 }
 
 __kernel void along_y(__global const VECTOR *narrow, __global const REAL *factors, __global const REAL *turn,
@@ -401,47 +410,64 @@ __kernel void along_y(__global const VECTOR *narrow, __global const REAL *factor
                       const int tall, __global VECTOR *scratch, const long room, const int first, const int terms,
                       const int reach, const int phi_max, const int rows, __global const REAL *shift, const int strip,
                       __global REAL *stack) {
-    const int points = axis.first.points * axis.second.points, n3 = axis.last.points;
-    __global VECTOR *b = scratch + get_global_id(0) * room, *own = b + PARTS * points * axis.stride, *folded = own;
+    const int points = axis.first.points * axis.second.points, n3 = axis.last.points, lit = min(terms - first, TERMS);
+    __global VECTOR *b = scratch + get_global_id(0) * room, *own = b + PARTS * GROUPS * points * axis.stride;
     __global const REAL *last = factors + factors_of(axis.first) + factors_of(axis.second);
     __global const REAL *last_turn = turn + 2 * (axis.first.points + points);
-    const int each = (axis.last.entries - 1) * K_PAIRS * 2;
+    const int each = (axis.last.entries - 1) * K_PAIRS * 2, folded = 2 * PARTS * axis.last.entries;
     const long width = reach + phi_max + 1;
 
-    ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0))
-        ROLLED for (int g = 0; g < GROUPS; ++g) {
-            const int begin = first + g * WIDTH, lit = min(terms - begin, WIDTH);
-            __global const VECTOR *sample = narrow + ((long)phi * tall * GROUPS + g) * PARTS;
-            ROLLED for (int j = 0; j < n3; ++j) {
-                __global const VECTOR *next = sample + PARTS * GROUPS * (j + 1) * points;
-                ROLLED for (int i = 0; i < PARTS * points; ++i) PREFETCH(next + GROUPS * i);
-                first_levels(sample + PARTS * GROUPS * j * points, PARTS * GROUPS, PARTS, factors, turn, axis, own,
-                             b + PARTS * j);
-            }
-            ROLLED for (int t = 0; t < axis.tiles; ++t) {
-                const int k = of[t];
-                fold_complex(b + PARTS * k * axis.stride, PARTS, last_turn + 2 * k * n3, axis.last, folded);
-                ROLLED for (int block = 0; block < axis.last.sets * axis.last.blocks; ++block) {
-                    const int set = block / axis.last.blocks;
-                    VECTOR f[K_PAIRS][2][PARTS];
-                    sum_complex(folded + 2 * PARTS * axis.last.entries * set, last + block * each, axis.last.entries,
-                                f);
-                    __global const int *to_rows = place + (t * axis.last.sets * axis.last.blocks + block) * K_PAIRS * 2;
-                    ROLLED for (int i = 0; i < 2 * K_PAIRS; ++i) {
+    ROLLED for (int phi = get_global_id(0); phi < columns; phi += get_global_size(0)) {
+        /* small phi is stored at -phi, too */
+        const int from = phi > phi_max, to = phi > 0 && phi <= reach ? 2 : 1;
+        __global const VECTOR *sample = narrow + (long)phi * tall * GROUPS * PARTS;
+        ROLLED for (int j = 0; j < n3; ++j) {
+            __global const VECTOR *next = sample + PARTS * GROUPS * (j + 1) * points;
+            ROLLED for (int i = 0; i < PARTS * GROUPS * points; i += GROUPS) PREFETCH(next + i);
+            ROLLED for (int g = 0; g < GROUPS; ++g)
+                first_levels(sample + PARTS * (GROUPS * j * points + g), PARTS * GROUPS, PARTS, factors, turn, axis,
+                             own, b + PARTS * (g * points * axis.stride + j));
+        }
+        ROLLED for (int t = 0; t < axis.tiles; ++t) {
+            const int k = of[t];
+            ROLLED for (int g = 0; g < GROUPS; ++g)
+                fold_complex(b + PARTS * (g * points + k) * axis.stride, PARTS, last_turn + 2 * k * n3, axis.last,
+                             own + g * axis.last.sets * folded);
+            ROLLED for (int block = 0; block < axis.last.sets * axis.last.blocks; ++block) {
+                const int set = block / axis.last.blocks;
+                __global const int *to_rows = place + (t * axis.last.sets * axis.last.blocks + block) * K_PAIRS * 2;
+                /* what is there already is asked for while the sums before it are made */
+                if (strip && (t + 1 < axis.tiles || block + 1 < axis.last.sets * axis.last.blocks))
+                    ROLLED for (int i = 2 * K_PAIRS; i < 4 * K_PAIRS; ++i) {
                         if (to_rows[i] < 0) continue;
-                        ROLLED for (int row = to_rows[i]; row < rows; row += axis.n) {
-                            const VECTOR c = shift[PARTS * row], s = shift[PARTS * row + 1];
-                            const VECTOR re = fma(-s, f[i / 2][i % 2][1], c * f[i / 2][i % 2][0]);
-                            const VECTOR im = fma(s, f[i / 2][i % 2][0], c * f[i / 2][i % 2][1]);
-                            /* small phi is stored at -phi, too */
-                            ROLLED for (int side = phi > phi_max; side < (phi > 0 && phi <= reach ? 2 : 1); ++side) {
-                                const long at = side ? (rows - 1 - row) * width + reach - phi : row * width + reach + phi;
-                                __global REAL *to = stack + at * PARTS * terms + begin;
-                                store_terms(re, side ? -im : im, lit, terms, strip, to);
+                        ROLLED for (int row = to_rows[i]; row < rows; row += axis.n)
+                            ROLLED for (int side = from; side < to; ++side) {
+                                const long at = place_of(row, phi, side, rows, reach, width);
+                                PREFETCH(stack + at * PARTS * terms + first);
+                                PREFETCH(stack + (at * PARTS + 1) * terms + first);
                             }
+                    }
+                VECTOR f[GROUPS][K_PAIRS][2][PARTS];
+                ROLLED for (int g = 0; g < GROUPS; ++g)
+                    sum_complex(own + (g * axis.last.sets + set) * folded, last + block * each, axis.last.entries,
+                                f[g]);
+                ROLLED for (int i = 0; i < 2 * K_PAIRS; ++i) {
+                    if (to_rows[i] < 0) continue;
+                    ROLLED for (int row = to_rows[i]; row < rows; row += axis.n) {
+                        const VECTOR c = shift[PARTS * row], s = shift[PARTS * row + 1];
+                        VECTOR turned[GROUPS][PARTS];
+                        UNROLL for (int g = 0; g < GROUPS; ++g) {
+                            const VECTOR re = f[g][i / 2][i % 2][0], im = f[g][i / 2][i % 2][1];
+                            turned[g][0] = fma(-s, im, c * re);
+                            turned[g][1] = fma(s, re, c * im);
+                        }
+                        ROLLED for (int side = from; side < to; ++side) {
+                            const long at = place_of(row, phi, side, rows, reach, width);
+                            store_terms(turned, side ? -1 : 1, lit, terms, strip, stack + at * PARTS * terms + first);
                         }
                     }
                 }
             }
         }
+    }
 }

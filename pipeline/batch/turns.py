@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from pipeline.config.models import Config
 from pipeline.stages import run
+from pipeline.stages.run import Step
 from pipeline.stages.session import Session
 from pipeline.store.store import Store
 
@@ -13,17 +14,18 @@ from pipeline.store.store import Store
 class Turn:
     """A config when it is to be baked.
 
-    config: the config. number: its place in the order, from 1. count: of all configs.
+    config: the config. steps: its plan. number: its place in the order, from 1. count: of all configs.
     session: the objects of the configs before it, of artifacts that it needs as well.
     """
 
     config: Config
+    steps: list[Step]
     number: int
     count: int
     session: Session
 
 
-def turns(configs: Sequence[Config], store: Store, until: str = "bundle") -> Iterator[Turn]:
+def turns(planned: Sequence[tuple[Config, list[Step]]], store: Store) -> Iterator[Turn]:
     """Yields configs in an order in which those that share artifacts follow each other.
 
     Configs follow by name, except that those of one surface follow its first config, those of the same power spectrum
@@ -32,19 +34,19 @@ def turns(configs: Sequence[Config], store: Store, until: str = "bundle") -> Ite
     that a config does not need are dropped when its turn comes. The exact reference and the curves of `validate` stay
     while configs share the transform of the surface, and while the stages of the next fit into memory beside them.
 
-    configs: of different names, in any order. store: the store of artifacts. until: name of the last stage.
+    planned: configs of different names, in any order, each with its plan. store: of their artifacts.
     """
-    addresses = {config.name: [step.key for step in run.plan(config, store, until)] for config in configs}
+    addresses = {config.name: [step.key for step in steps] for config, steps in planned}
     first: dict[str, str] = {}
     for name in sorted(addresses):
         for address in addresses[name]:
             first.setdefault(address, name)
-    ordered = sorted(configs, key=lambda config: [*(first[a] for a in addresses[config.name]), config.name])
+    ordered = sorted(planned, key=lambda each: [*(first[a] for a in addresses[each[0].name]), each[0].name])
     session, before = Session(), ""
-    for number, config in enumerate(ordered, 1):
+    for number, (config, steps) in enumerate(ordered, 1):
         transform = addresses[config.name][:2][-1]
-        fits = run.fits(config, run.plan(config, store, until), store, session.derived_bytes)
+        fits = run.fits(config, steps, store, session.derived_bytes)
         session.retain(addresses[config.name], derived=transform == before and fits)
-        session.following = [later for later in ordered[number:] if addresses[later.name][:2][-1] == transform]
+        session.following = [later for later, _ in ordered[number:] if addresses[later.name][:2][-1] == transform]
         before = transform
-        yield Turn(config, number, len(ordered), session)
+        yield Turn(config, steps, number, len(ordered), session)

@@ -8,7 +8,7 @@ from pipeline.accuracy import scalar_domain
 from pipeline.bundle.manifest import Colour, Coverage, Domain, MadeBy, Provenance
 from pipeline.config.models import Config
 from pipeline.optics.light import LaserLine
-from pipeline.store.digest import of_file
+from pipeline.store.digest import of_source
 from pipeline.store.store import Artifact
 from pipeline.surface.periods import Period
 
@@ -138,4 +138,4 @@ def _file_or_name(name: str) -> dict[str, Any]:
 
 
 def _named_file(path: str) -> dict[str, Any]:
-    return {"file": Path(path).name, "sha256": of_file(Path(path))}
+    return {"file": Path(path).name, "sha256": of_source(Path(path))}

@@ -1,4 +1,6 @@
-"""The check that a device works, whose failure is one of the project's errors."""
+"""The check that a device works, whose failure is one of the project's errors; and the device's memory."""
+
+from contextlib import AbstractContextManager
 
 from kernels import device
 from pipeline.errors import DeviceError, StorageError
@@ -14,3 +16,9 @@ def require_device() -> None:
         ) from None
     except device.NoDeviceError as error:
         raise DeviceError(str(error)) from None
+
+
+def keeping_memory() -> AbstractContextManager[None]:
+    """Keeps all memory of arrays for the device while this lasts, for parts of a work that take the same in turn."""
+    require_device()
+    return device.default_device().memory.keeping()

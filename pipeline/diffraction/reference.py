@@ -21,6 +21,7 @@ from kernels import windowed_dft
 from pipeline import resources
 from pipeline.arrays import Array
 from pipeline.diffraction import dft_stack, expansion
+from pipeline.diffraction.device import keeping_memory
 from pipeline.diffraction.upload import upload
 from pipeline.optics import brdf, geometry
 from pipeline.optics.coherence import folded_window
@@ -274,17 +275,18 @@ class Reference:
         """Computes |P|^2 for queries at windows on one field, whose stack is held or made in parts."""
         is_held, terms = self._held is not None, self._size.terms
         exact: list[windowed_dft.ExactPower] = []
-        for first in range(0, terms, self._size.terms_at_once):
-            built, stack = self._held or self._uploaded(field, first)
-            part = windowed_dft.PartOfTerms(first // windowed_dft.LANES, terms // windowed_dft.LANES)
-            for query, places in queries[len(exact) :]:
-                modes = dft_stack.modes(built, places)
-                lambda_um = 1e-3 * query.lambda_nm
-                exact.append(windowed_dft.ExactPower(query.uvw, lambda_um, modes, in_parts=not is_held))
-            for each in exact:
-                each.add(stack, part)
-            # its memory serves the next part
-            del built, stack
+        with keeping_memory():
+            for first in range(0, terms, self._size.terms_at_once):
+                built, stack = self._held or self._uploaded(field, first)
+                part = windowed_dft.PartOfTerms(first // windowed_dft.LANES, terms // windowed_dft.LANES)
+                for query, places in queries[len(exact) :]:
+                    modes = dft_stack.modes(built, places)
+                    lambda_um = 1e-3 * query.lambda_nm
+                    exact.append(windowed_dft.ExactPower(query.uvw, lambda_um, modes, in_parts=not is_held))
+                for each in exact:
+                    each.add(stack, part)
+                # its memory serves the next part
+                del built, stack
         return [each.power() for each in exact]
 
     def _uploaded(self, field: HeightField, first: int) -> tuple[dft_stack.Stack, windowed_dft.DeviceStack]:

@@ -43,6 +43,7 @@ class Results:
 
 def validate(
     config: Config,
+    steps: list[run.Step],
     store: Store,
     folder: Path,
     progress: Progress = silent,
@@ -51,16 +52,18 @@ def validate(
 ) -> Results:
     """Runs every stage except the bundle, and copies maps and report from the store into a folder.
 
-    config: the config. store: the store of its artifacts. folder: of the results, made where it is missing.
+    config: the config. steps: its plan until this stage. store: the store of its artifacts.
+    folder: of the results, made where it is missing.
     progress: called with a step's name and its completed share, 0 to 1. on_step, session: as in `run.execute`.
     Returns the results; a missed budget raises nothing, see `Results.missed_budget`.
     Raises StorageError where a file cannot be written, and the errors of the stages.
     """
-    return _until("validate", config, store, folder, progress, on_step, session)
+    return _made(config, steps, store, folder, progress, on_step, session)
 
 
 def make(
     config: Config,
+    steps: list[run.Step],
     store: Store,
     folder: Path,
     progress: Progress = silent,
@@ -69,24 +72,24 @@ def make(
 ) -> tuple[Results, Path]:
     """Runs every stage, and copies maps, report and bundle from the store into a folder.
 
-    Parameters and errors are those of `validate`.
+    steps: the plan of the config until its bundle. Other parameters and errors are those of `validate`.
     Returns the results and the bundle's folder.
     Raises DamagedError as well, where `folder` already has a bundle of this name whose files have changed.
     """
-    results = _until("bundle", config, store, folder, progress, on_step, session)
+    results = _made(config, steps, store, folder, progress, on_step, session)
     return results, bundle.place(store.open("bundle", results.artifacts["bundle"].key), folder)
 
 
-def _until(
-    stage: str,
+def _made(
     config: Config,
+    steps: list[run.Step],
     store: Store,
     folder: Path,
     progress: Progress,
     on_step: OnStep | None,
     session: Session | None,
 ) -> Results:
-    artifacts = run.execute(config, run.plan(config, store, stage), store, progress, on_step, session)
+    artifacts = run.execute(config, steps, store, progress, on_step, session)
     return Results(config.name, artifacts, _lay_out(store, artifacts, folder))
 
 

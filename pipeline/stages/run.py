@@ -132,7 +132,7 @@ def execute(
     none works, and the errors of the stages and the store.
     """
     keys = {step.stage.name: step.key for step in steps}
-    device = _Device() if any(step.stage.uses_device and not step.cached for step in steps) else None
+    device = _Device() if _uses_device(steps, store) else None
     if device is not None:
         device.start()
     opened: dict[str, Artifact] = {}
@@ -157,6 +157,11 @@ def execute(
         if on_step is not None:
             on_step(step, seconds)
     return {name: store.describe(name, key) for name, key in keys.items()}
+
+
+def _uses_device(steps: list[Step], store: Store) -> bool:
+    """Says whether a step that is to do uses a device; other runs may have made artifacts since the plan."""
+    return any(step.stage.uses_device and not store.has(step.stage.name, step.key) for step in steps)
 
 
 class _Device(Thread):
@@ -213,8 +218,9 @@ def require_memory(config: Config, steps: list[Step], store: Store, largest_buff
 def fits(config: Config, steps: list[Step], store: Store, held_bytes: int) -> bool:
     """Says whether every step that is to do fits into memory beside objects of `held_bytes`, as far as is known."""
     needs, most = forecast.needs(config, summaries(steps, store)), resources.limit().bytes
-    to_do = [needs[step.stage.name] for step in steps if not step.cached and step.stage.name in needs]
-    return all(need.bytes + held_bytes <= most for need in to_do)
+    # configs before this one may have made artifacts since the plan
+    to_do = [step.stage.name for step in steps if not store.has(step.stage.name, step.key)]
+    return all(needs[name].bytes + held_bytes <= most for name in to_do if name in needs)
 
 
 def summaries(steps: list[Step], store: Store) -> dict[str, Summary]:

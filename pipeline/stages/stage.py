@@ -91,7 +91,7 @@ def kernel_digest(*names: str) -> str:
 def file_or_name(name: str) -> dict[str, str]:
     """Returns the digest of a CSV file, or the name itself where it names no file, as part of an address."""
     if name.lower().endswith(".csv"):
-        return {"sha256": digest.of_file(Path(name))}
+        return {"sha256": digest.of_source(Path(name))}
     return {"name": name}
 
 

@@ -37,7 +37,7 @@ def _parameters(config: Config) -> dict[str, Any]:
     section = {**config.surface.model_dump(mode="json"), "level": config.surface.levelling}
     if config.surface.path is not None:
         require_file(Path(config.surface.path))
-        section["path"] = {"sha256": digest.of_file(Path(config.surface.path))}
+        section["path"] = {"sha256": digest.of_source(Path(config.surface.path))}
     # the statistics depend on the window and the shortest wavelength
     return {
         "surface": section,
@@ -49,6 +49,7 @@ def _parameters(config: Config) -> dict[str, Any]:
 def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -> Summary:
     progress("surface", 0.0)
     field, cleaning, scan = field_of(config)
+    _require_unchanged(config, inputs)
     lambda_min = config.light.lambda_min_nm
     statistics = measure(field, config.coherence.sigma_um, lambda_min)
     x, y = field.coordinates_um()
@@ -75,6 +76,12 @@ def _produce(config: Config, inputs: Inputs, folder: Path, progress: Progress) -
     }
 
 
+def _require_unchanged(config: Config, inputs: Inputs) -> None:
+    """Raises InputError where the scan is no longer the one that was planned for, whose digest is in the address."""
+    if SURFACE.key(config, {}) != inputs.address:
+        raise InputError(f"{config.surface.path}: the scan has changed since the bake began; bake it again")
+
+
 def field_of(config: Config) -> tuple[HeightField, ConditioningRecord, dict[str, Any] | None]:
     """Makes or reads the height field of a config and conditions it.
 
@@ -98,7 +105,8 @@ def field_of(config: Config) -> tuple[HeightField, ConditioningRecord, dict[str,
 def need(source: SurfaceSource, extent: Extent, lambda_min_nm: float) -> Need:
     """Computes memory and time of this stage from its samples.
 
-    A recipe is made, or a scan conditioned in five arrays; then the conditioned field is measured.
+    A recipe is made, or a scan conditioned in five arrays, fewer where nothing is filled or clipped; then the
+    conditioned field is measured.
     """
     making = 5 * extent.bytes if source.recipe is None else recipes.making_bytes(source.recipe, extent.samples)
     measuring = measuring_bytes(extent, lambda_min_nm)
@@ -183,4 +191,4 @@ def load(artifact: Artifact) -> HeightField:
     return HeightField(arrays.load(zarr, "height"), (pitch[0], pitch[1]))
 
 
-SURFACE = Stage("surface", 9, (), _parameters, _produce)
+SURFACE = Stage("surface", 10, (), _parameters, _produce)

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,17 @@ def of_file(path: Path) -> str:
     """Computes the SHA-256 of a file."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def of_source(path: Path) -> str:
+    """Computes the SHA-256 of a file that a config names; again only where its status says that it has changed."""
+    status = path.stat()
+    return _of_source(path, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
+@lru_cache(maxsize=1024)
+def _of_source(path: Path, *_status: int) -> str:
+    return of_file(path)
 
 
 def of_folder(folder: Path) -> dict[str, dict[str, Any]]:

@@ -4,6 +4,7 @@ Levelling and clipping use valid samples only. Holes are therefore filled last, 
 """
 
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from pipeline.surface.heightfield import HeightField
 Mask = NDArray[np.bool_]
 
 LEVELS = ("none", "plane", "quadratic", "rows")
+# rows that are levelled at once
+_ROWS_AT_ONCE = 64
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,10 @@ def condition(
     if holes:
         heights = fill_holes(heights, valid, field.pitch_um)
     centre = 0.5 * (float(heights.max()) + float(heights.min()))
-    centred = np.subtract(heights, centre, out=on_a_cache_line(heights.shape, np.float64))
-    return HeightField(centred, field.pitch_um), replace(record, centre_um=centre)
+    # the scan's own heights stay as they are; the levelled ones serve nothing else
+    is_levelled = level != "none" and clip_percentile is None and not holes
+    out = heights if is_levelled else on_a_cache_line(heights.shape, np.float64)
+    return HeightField(np.subtract(heights, centre, out=out), field.pitch_um), replace(record, centre_um=centre)
 
 
 # --- levelling ---------------------------------------------------------------------------------------
@@ -91,50 +96,93 @@ def _level(field: HeightField, valid: Mask, record: ConditioningRecord) -> tuple
     if record.level == "none":
         return heights, record
     background, slopes, curvatures = _polynomial(field, valid, degree=2 if record.level == "quadratic" else 1)
-    offsets = np.zeros(heights.shape[0])
+    levelled, offsets = on_a_cache_line(heights.shape, np.float64), np.zeros(heights.shape[0])
+    for rows in _blocks(heights):
+        np.subtract(heights[rows], background.of(rows), out=levelled[rows])
     if record.level == "rows":
-        offsets = _row_medians(heights - background, valid)
-        background = background + offsets[:, None]
+        offsets = _row_medians(levelled, valid)
+        levelled -= offsets[:, None]
     record = replace(
         record,
         slope_deg=slopes,
         curvature_per_um=curvatures,
         row_offset_rms_um=float(np.std(offsets)),
-        removed_rms_um=float(np.std(background[valid])),
+        removed_rms_um=_removed_rms(background, offsets, valid),
     )
-    return heights - background, record
+    return levelled, record
+
+
+def _blocks(heights: Array | Mask) -> list[slice]:
+    """Divides rows into blocks: arrays of all samples would cost more time for their pages than for their values."""
+    return [slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(heights), _ROWS_AT_ONCE)]
+
+
+@dataclass(frozen=True)
+class _Background:
+    """A polynomial over the samples: sum along_y[:, p] x^p.
+
+    along_y: its coefficients in every row, um, (ny, 3). powers_x: of x, (3, nx).
+    """
+
+    along_y: Array
+    powers_x: Array
+
+    def of(self, rows: slice) -> Array:
+        """Computes its values in some rows, (rows, nx), um."""
+        constant, linear, square = self.along_y[rows].T[:, :, None]
+        values: Array = linear * self.powers_x[1] + constant
+        if square.any():
+            values += square * self.powers_x[2]
+        return values
+
+
+def _removed_rms(background: _Background, offsets: Array, valid: Mask) -> float:
+    """Computes the standard deviation of what was subtracted from the valid samples, um; offsets: of rows, (ny,)."""
+    # relative to a value among them, so that the squares lose no digits
+    middle = float(np.mean(background.along_y[:, 0] + offsets))
+    total = squares = 0.0
+    for rows in _blocks(valid):
+        removed = np.where(valid[rows], background.of(rows) + (offsets[rows, None] - middle), 0.0)
+        total += float(np.sum(removed))
+        squares += float(np.sum(np.vecdot(removed, removed)))
+    count = np.count_nonzero(valid)
+    return sqrt(max(0.0, squares / count - (total / count) ** 2))
 
 
 def _polynomial(
     field: HeightField, valid: Mask, degree: int
-) -> tuple[Array, tuple[float, float], tuple[float, float, float]]:
+) -> tuple[_Background, tuple[float, float], tuple[float, float, float]]:
     """Fits a least-squares polynomial to the valid samples.
 
-    Returns its values (ny, nx), um, its slopes along (x, y), degrees, and its curvatures (xx, xy, yy), 1/um.
+    Returns it, its slopes along (x, y), degrees, and its curvatures (xx, xy, yy), 1/um.
     """
     (x, y), (pitch_x, pitch_y) = field.coordinates_um(), field.pitch_um
     # on [-1, 1] all powers have one magnitude, and the normal equations are well conditioned
     scale_x, scale_y = max(pitch_x, -x[0]), max(pitch_y, -y[0])
     # without its mean, heights with a large offset keep their digits
     mean = float(np.mean(field.heights_um, where=valid))
-    heights = np.where(valid, field.heights_um - mean, 0.0)
-    c = _fit(x / scale_x, y / scale_y, heights, valid, degree)
-    powers_x, powers_y = _powers(x / scale_x, 2), _powers(y / scale_y, 2)
-    background = mean + powers_y @ c @ powers_x.T
+    c = _fit(x / scale_x, y / scale_y, field.heights_um, mean, valid, degree)
+    along_y = _powers(y / scale_y, 2) @ c
+    along_y[:, 0] += mean
     slope_x, slope_y = np.degrees(np.arctan([c[0, 1] / scale_x, c[1, 0] / scale_y]))
     xx, xy, yy = 2 * c[0, 2] / scale_x**2, c[1, 1] / (scale_x * scale_y), 2 * c[2, 0] / scale_y**2
+    background = _Background(along_y, np.ascontiguousarray(_powers(x / scale_x, 2).T))
     return background, (float(slope_x), float(slope_y)), (float(xx), float(xy), float(yy))
 
 
-def _fit(x: Array, y: Array, heights: Array, valid: Mask, degree: int) -> Array:
-    """Fits sum c[q, p] x^p y^q with p + q <= degree <= 2 to `heights` (ny, nx), which are 0 in holes.
+def _fit(x: Array, y: Array, heights: Array, mean: float, valid: Mask, degree: int) -> Array:
+    """Fits sum c[q, p] x^p y^q with p + q <= degree <= 2 to the valid `heights` (ny, nx) minus `mean`.
 
     Sums of monomials over a grid separate into small matrix products, so that no design matrix is needed.
     x, y: coordinates (nx,), (ny,). Returns c (3, 3).
     """
-    powers_x, powers_y = _powers(x, 2 * degree), _powers(y, 2 * degree)
-    moments = powers_y.T @ (valid @ powers_x)
-    right = powers_y.T @ (heights @ powers_x)
+    powers_x, powers_y = np.ascontiguousarray(_powers(x, 2 * degree).T), _powers(y, 2 * degree)
+    counts, sums = np.empty((2, len(y), len(powers_x)))
+    for rows in _blocks(heights):
+        # a matrix product would start threads, which cost more than these few sums
+        counts[rows] = np.vecdot(valid[rows].astype(np.float64)[:, None], powers_x)
+        sums[rows] = np.vecdot(np.where(valid[rows], heights[rows] - mean, 0.0)[:, None], powers_x)
+    moments, right = powers_y.T @ counts, powers_y.T @ sums
     terms = [(q, p) for q in range(degree + 1) for p in range(degree + 1 - q)]
     gram = np.array([[moments[q + s, p + r] for s, r in terms] for q, p in terms])
     # lstsq returns the solution of least norm: terms that a single row, or holes, leave undetermined are 0
@@ -167,10 +215,13 @@ def _clip(
     heights: Array, valid: Mask, percentile: tuple[float, float] | None, record: ConditioningRecord
 ) -> tuple[Array, ConditioningRecord]:
     """Limits heights to percentiles of the valid samples, and records the change."""
-    known = heights[valid]
-    before = float(known.max() - known.min())
+    highest, lowest = (
+        float(end(heights, where=valid, initial=outside)) for end, outside in ((np.max, -np.inf), (np.min, np.inf))
+    )
+    before = highest - lowest
     if percentile is None:
         return heights, replace(record, range_before_um=before, range_after_um=before)
+    known = heights[valid]
     low, high = (float(value) for value in np.percentile(known, percentile))
     below, above = int(np.count_nonzero(known < low)), int(np.count_nonzero(known > high))
     record = replace(

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.arrays import Array
-from pipeline.surface.no_data import Mask, doubtful_extremes, numbers, plateau, sample, spread
+from pipeline.surface.no_data import Mask, doubtful_extremes, numbers, plateau, sample_without, spread
 from pipeline.surface.scan import Scan
 from pipeline.surface.unscanned import constant_lines, repeated_lines, smooth_edge, straight_lines
 
@@ -73,17 +73,20 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
     data; None finds them, and rows that were not scanned, by their values.
     Returns the part that was measured; all of a scan in which nothing was.
     """
-    heights = scan.heights.copy()
+    heights = scan.heights
     hole = np.isnan(heights)
     found: list[Unmeasured] = []
     doubts: list[str] = []
 
     def add(kind: str, stated: bool, new: Mask, value: float | None = None) -> None:
+        nonlocal heights
         new &= ~hole
         samples = int(np.count_nonzero(new))
         if samples:
             found.append(Unmeasured(kind, stated, samples, samples / hole.size, value))
             hole[new] = True
+            # the scan's own array stays as it was read; most scans need no other
+            heights = heights.copy() if heights is scan.heights else heights
             heights[new] = np.nan
 
     samples = int(np.count_nonzero(hole))
@@ -105,10 +108,10 @@ def measured_part(scan: Scan, mask: MaskUse | None = None, no_data: tuple[float,
             add(f"straight {lines}", False, np.moveaxis(new, 0, axis))
             new = repeated_lines(np.moveaxis(heights, axis, 0), np.moveaxis(hole, axis, 0))
             add(f"repeated {lines}", False, np.moveaxis(new, 0, axis))
-        if (found_one := plateau(heights[~hole])) is not None:
+        if (found_one := plateau(sample_without(heights, hole))) is not None:
             value, tolerance = found_one
             add("one value among heights", False, np.abs(heights - value) <= tolerance, value)
-        doubts = [*doubtful_extremes(heights[~hole]), *_smooth_warnings(heights)]
+        doubts = [*doubtful_extremes(sample_without(heights, hole)), *_smooth_warnings(heights)]
     box, cropped = _box(hole)
     masked_share = 0.0 if scan.mask is None else float(np.mean(scan.mask))
     kept = np.ascontiguousarray(heights[box])
@@ -128,7 +131,7 @@ def far_apart(heights_um: Array) -> str | None:
     Their distance is more than 2 um, deeper than any relief that the scalar model of visible light describes, and
     more than five times the range of either.
     """
-    values = np.sort(sample(heights_um[np.isfinite(heights_um)]))
+    values = np.sort(sample_without(heights_um, ~np.isfinite(heights_um)))
     least = max(2, int(_POPULATION * values.size))
     if values.size < 4 * least:
         return None

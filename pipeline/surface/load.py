@@ -77,7 +77,9 @@ def load_scan(surface: SurfaceSource) -> tuple[HeightField, ScanRecord]:
     measured = measured_part(scan, surface.mask, surface.no_data)
     _check_holes(path.name, measured, surface.max_hole_share)
     unit, pitch = _units(path.name, scan, surface)
-    heights = measured.heights * unit[0]
+    # the scan serves nothing else; what a reader took from a file's bytes cannot be changed
+    heights = measured.heights
+    heights = np.multiply(heights, unit[0], out=heights if heights.flags.writeable else None)
     _check_pitch(path.name, pitch[0])
     _check_range(path.name, heights, unit, scan.full_code is not None)
     field = HeightField(heights, pitch[0])

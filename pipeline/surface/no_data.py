@@ -27,30 +27,50 @@ _DOUBTFUL = 0.1
 def numbers(heights: Array, hole: Mask, is_image: bool) -> list[float]:
     """Lists the no-data numbers: extreme values, far from all others, of convention or shared by many samples."""
     found: list[float] = []
-    with np.errstate(invalid="ignore"):
-        known = heights[~hole & (np.abs(heights) < _BEYOND_HEIGHTS)]
-        wild = heights[~hole & (np.abs(heights) >= _BEYOND_HEIGHTS) & np.isfinite(heights)]
+    known, wild = _within_reason(heights, hole)
     found += [float(value) for value in np.unique(wild)[:8]]
     while known.size > LEAST_VALUES and len(found) < 16:
         low, high = float(known.min()), float(known.max())
-        between = known[(known > low) & (known < high)]
-        candidates = [value for value in (low, high) if _is_no_data(known, value, between, is_image)]
+        extreme = (known == low) | (known == high)
+        few = sample_without(known, extreme)
+        if not few.size:
+            break
+        # of all between the lowest and the highest, the nearest to either
+        nearest = (
+            float(np.min(known, where=~extreme, initial=np.inf)),
+            float(np.max(known, where=~extreme, initial=-np.inf)),
+        )
+        candidates = [
+            value
+            for value, beside in zip((low, high), nearest, strict=True)
+            if _is_no_data(known, value, abs(beside - value), few, is_image)
+        ]
         if not candidates:
             break
         # the farther one first: the other may be a height
-        middle = float(np.median(sample(between)))
+        middle = float(np.median(few))
         value = max(candidates, key=lambda candidate: abs(candidate - middle))
         found.append(value)
         known = known[known != value]
     return found
 
 
-def _is_no_data(known: Array, value: float, between: Array, is_image: bool) -> bool:
-    """Whether the lowest or highest value is a number for no data. between: those between the lowest and highest."""
-    if not between.size:
-        return False
-    gap = float(np.min(np.abs(between - value)))
-    range_ = spread(between)
+def _within_reason(heights: Array, hole: Mask) -> tuple[Array, Array]:
+    """Returns the known values (n,) of a size that heights may have, and the larger ones (m,) but infinities."""
+    # all of most scans: then without a copy
+    if not hole.any() and max(-float(heights.min()), float(heights.max())) < _BEYOND_HEIGHTS:
+        return heights.reshape(-1), np.empty(0)
+    with np.errstate(invalid="ignore"):
+        small = np.abs(heights) < _BEYOND_HEIGHTS
+    return heights[~hole & small], heights[~hole & ~small & np.isfinite(heights)]
+
+
+def _is_no_data(known: Array, value: float, gap: float, few: Array, is_image: bool) -> bool:
+    """Whether the lowest or highest value is a number for no data.
+
+    gap: its distance from the nearest other value. few: a sample of the values between the lowest and highest.
+    """
+    range_ = spread(few)
     size = abs(value)
     if not is_image and (size >= _BEYOND_OUTLIERS or size in _CONVENTIONAL):
         return range_ > 0 and gap >= _APART_KNOWN * range_
@@ -58,7 +78,7 @@ def _is_no_data(known: Array, value: float, between: Array, is_image: bool) -> b
     if not max(LEAST_COUNT, _LEAST_SHARE * known.size) <= count <= _LARGEST_SHARE * known.size:
         return False
     # differences by rounding make no different values
-    steps = np.unique(np.round((sample(between) - value) / gap, 6))
+    steps = np.unique(np.round((few - value) / gap, 6))
     return range_ > 0 and gap >= _APART * range_ and steps.size >= LEAST_VALUES
 
 
@@ -114,6 +134,16 @@ def sample(values: Array) -> Array:
     """Takes every n-th of many values."""
     # an odd step meets all columns of the usual widths
     return values[:: values.size // _ESTIMATED_FROM | 1]
+
+
+def sample_without(values: Array, excluded: Mask) -> Array:
+    """Takes every n-th of the values that are not excluded, `sample(values[~excluded])`, without a copy of all."""
+    places = np.flatnonzero(excluded)
+    count = values.size - places.size
+    kept = np.arange(0, count, count // _ESTIMATED_FROM | 1)
+    # the place of the i-th value that is kept: i, and one more for each excluded one before it
+    taken: Array = values.reshape(-1)[kept + np.searchsorted(places - np.arange(places.size), kept, "right")]
+    return taken
 
 
 def spread(values: Array) -> float:

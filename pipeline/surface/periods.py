@@ -157,7 +157,8 @@ def _spectrum(field: HeightField, highest_per_um: float, window_of: Callable[[in
     variance = variance if variance > (1e-12 * peak) ** 2 else 0.0
     power = np.empty((len(y), len(x)))
     for side, rows in ((~opposite, y), (opposite, -y % ny)):
-        power[:, side] = np.abs(half[np.ix_(rows, columns[side])]) ** 2 / (heights.size * weight)
+        for part in _parts(len(rows)):
+            power[part, side] = np.abs(half[np.ix_(rows[part], columns[side])]) ** 2 / (heights.size * weight)
     size_x, size_y = field.size_um
     return _HeightSpectrum(power, fx, fy, (1 / size_x, 1 / size_y), variance)
 
@@ -255,7 +256,8 @@ def _smooth(spectrum: _HeightSpectrum, transform: NDArray[np.complex128], width_
     rows, columns = spectrum.power.shape
     smoothed = transform * gain_y[:, None]
     smoothed *= gain_x
-    return np.fft.irfft2(smoothed, (my, mx))[:rows, :columns]
+    np.fft.ifft(smoothed, axis=0, out=smoothed)
+    return np.fft.irfft(smoothed[:rows], mx)[:, :columns]
 
 
 def _fast(shape: tuple[int, ...]) -> tuple[int, int]:

@@ -54,7 +54,8 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
     sigma_um: standard deviation of the coherence window, um. lambda_min_nm: the shortest wavelength, nm.
     """
     heights = field.heights_um
-    sigma_h = float(np.std(heights))
+    variance = _variance(heights)
+    sigma_h = sqrt(variance)
     reach = 2e3 / lambda_min_nm
     size_x, size_y = field.size_um
     return SurfaceStatistics(
@@ -70,7 +71,7 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
         periods=dominant_periods(field, reach),
         seam_step_um=(_rms(heights[:, 0] - heights[:, -1]), _rms(heights[0] - heights[-1])),
         inner_step_um=(_inner_step(heights.T), _inner_step(heights)),
-        seam_energy=_seam_energy(heights),
+        seam_energy=_seam_energy(heights, variance),
         windows=(size_x / sigma_um, size_y / sigma_um),
     )
 
@@ -78,14 +79,23 @@ def measure(field: HeightField, sigma_um: float, lambda_min_nm: float) -> Surfac
 def measuring_bytes(extent: Extent, lambda_min_nm: float) -> int:
     """Computes the memory in which `measure` works, bytes.
 
-    The square deviations of `np.std`, or, in `periods`, the half of the transform along x that views can reach and
-    eight arrays of the frequencies that they can reach.
+    In `periods`, the half of the transform along x that views can reach and eight arrays of the frequencies that they
+    can reach.
     """
     share_x, share_y = (min(1.0, 2.0 * pitch * 2e3 / lambda_min_nm) for pitch in extent.pitch_um)
-    return 8 * round(extent.samples * max(1.0, share_x + 8 * share_x * share_y))
+    return 8 * round(extent.samples * (share_x + 8 * share_x * share_y))
 
 
-def _seam_energy(heights: Array) -> float:
+def _variance(heights: Array) -> float:
+    """Computes the mean square deviation from the mean, um^2."""
+    mean, total = float(np.mean(heights)), 0.0
+    for first in range(0, len(heights), _ROWS_AT_ONCE):
+        deviations = heights[first : first + _ROWS_AT_ONCE] - mean
+        total += float(np.sum(np.vecdot(deviations, deviations)))
+    return total / heights.size
+
+
+def _seam_energy(heights: Array, variance: float) -> float:
     """Computes the share of the variance in the smooth component of Moisan's decomposition (2011).
 
     The component solves a Poisson equation whose sources are the steps across the seams; it is 0 for a periodic
@@ -109,7 +119,6 @@ def _seam_energy(heights: Array) -> float:
             waves[0, 0] = np.inf  # removes the mean, for which waves - 4 would be 0
         smooth += float(np.sum(twice * (sources.real**2 + sources.imag**2) / (waves - 4.0) ** 2))
     smooth /= heights.size**2
-    variance = float(np.var(heights))
     return smooth / variance if variance > 0.0 else 0.0
 
 

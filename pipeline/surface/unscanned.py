@@ -151,8 +151,6 @@ def repeated_lines(heights: Array, hole: Mask) -> Mask:
     rows = np.flatnonzero(~hole.all(axis=1))
     if rows.size < _LEAST_ROWS + _LEAST_REPEATS:
         return new
-    # rows of one value are judged by `constant_lines`
-    varies = np.nanmax(heights[rows], axis=1) > np.nanmin(heights[rows], axis=1)
     edges = [*_adjacent(rows[: _LEAST_REPEATS + 1]), *_adjacent(rows[-_LEAST_REPEATS - 1 :])]
     if not any(all(_are_equal(heights, pairs)) for pairs in (edges[:_LEAST_REPEATS], edges[_LEAST_REPEATS:])):
         return new
@@ -167,7 +165,8 @@ def repeated_lines(heights: Array, hole: Mask) -> Mask:
             edge >= max(_LEAST_REPEATS, _MORE_REPEATS * (longest + 1) - 1)
             and rest.size >= _LEAST_ROWS
             and np.mean(rest) <= _OTHER_REPEATS
-            and varies[np.searchsorted(rows, real)]
+            # rows of one value are judged by `constant_lines`
+            and np.nanmax(heights[real]) > np.nanmin(heights[real])
         ):
             new[slice(real + 1, None) if turned else slice(None, real)] = True
     return new

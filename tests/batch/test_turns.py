@@ -1,19 +1,23 @@
 """The order of several configs, the stages that they share, and the objects that they hold in memory."""
 
 from collections import Counter
+from collections.abc import Sequence
 from itertools import permutations
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
+import numpy as np
 import pytest
 
 from pipeline.batch.turns import turns
 from pipeline.config import read
 from pipeline.config.models import Config
+from pipeline.errors import InputError
 from pipeline.stages import run
 from pipeline.stages.polar import power_spectrum
 from pipeline.stages.session import Session
+from pipeline.store import digest
 from pipeline.store.store import Store
 
 # 100 x 100 samples, whose table takes a tenth of a second
@@ -32,6 +36,10 @@ def small(name: str, amplitude_um: float = 0.02, **sections: dict[str, Any]) -> 
     return read.parse(document, name, Path.cwd())
 
 
+def plans(configs: Sequence[Config], store: Store, until: str = "bundle") -> list[tuple[Config, list[run.Step]]]:
+    return [(config, run.plan(config, store, until)) for config in configs]
+
+
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
     return Store(tmp_path / "store")
@@ -48,8 +56,8 @@ def test_configs_of_one_surface_and_of_one_power_spectrum_follow_each_other(stor
         small("f", accuracy={"delta_e": 80.0}, spectrum={"illuminant": "A"}),
     ]
     for given in list(permutations(configs))[::7]:
-        assert "".join(turn.config.name for turn in turns(given, store)) == "adcfbe"
-    assert [(turn.number, turn.count) for turn in turns(configs[:2], store)] == [(1, 2), (2, 2)]
+        assert "".join(turn.config.name for turn in turns(plans(given, store), store)) == "adcfbe"
+    assert [(turn.number, turn.count) for turn in turns(plans(configs[:2], store), store)] == [(1, 2), (2, 2)]
 
 
 @pytest.mark.parametrize(
@@ -92,15 +100,37 @@ def test_ten_lights_and_materials_make_one_surface_and_one_power_spectrum(
 
     monkeypatch.setattr(Session, "keep", keep_and_watch)
     monkeypatch.setattr(power_spectrum, "load", lambda _: pytest.fail("read from the store"))
-    for turn in turns(configs, store, "table"):
-        steps = run.plan(turn.config, store, "table")
-        assert set(alive) <= {step.key for step in steps}
+    for turn in turns(plans(configs, store, "table"), store):
+        assert set(alive) <= {step.key for step in turn.steps}
         run.execute(
             turn.config,
-            steps,
+            turn.steps,
             store,
             on_step=lambda step, seconds: made.update([step.stage.name] * (seconds is not None)),
             session=turn.session,
         )
     # "D65" and an index of 1.5 are the defaults, so one table is made for both
     assert made == {"surface": 2, "power_spectrum": 2, "table": 10}
+
+
+def test_a_scan_is_hashed_once_and_refused_where_it_changes_after_the_plan(
+    tmp_path: Path, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The address of its artifacts has its digest, and the run of another config may lie between plan and bake."""
+    scan, hashed = tmp_path / "scan.npy", Counter[Path]()
+    of_file = digest.of_file
+    monkeypatch.setattr(digest, "of_file", lambda path: hashed.update([path]) or of_file(path))
+    rng = np.random.default_rng(1)
+    np.save(scan, rng.normal(0.0, 0.02, (64, 64)))
+    document = {**SMALL, "name": "scan", "surface": {"path": str(scan), "pitch_um": 0.1, "height_unit": "um"}}
+    config = read.parse(document, "scan", Path.cwd())
+    (turn,) = turns(plans([config], store, "power_spectrum"), store)
+    run.execute(turn.config, turn.steps, store, session=turn.session)
+    run.plan(config, store)
+    assert hashed[scan] == 1
+    np.save(scan, rng.normal(0.0, 0.02, (64, 64)))
+    steps = run.plan(config, store, "surface")
+    assert hashed[scan] == 2
+    np.save(scan, rng.normal(0.0, 0.02, (64, 64)))
+    with pytest.raises(InputError, match="the scan has changed since the bake began"):
+        run.execute(config, steps, store)

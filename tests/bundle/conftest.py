@@ -59,7 +59,7 @@ class Baker:
             key = stage.key(config, {name: artifact.key for name, artifact in made.items()})
             if not self._store.has(stage.name, key):
                 with self._store.create(stage.name, key, {"version": stage.version}) as (folder, record):
-                    record["summary"] = stage.produce(config, Inputs(made), folder, silent)
+                    record["summary"] = stage.produce(config, Inputs(made, address=key), folder, silent)
                     record["provenance"] = {
                         "numpy": "2.0.0",
                         "device": "a device",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kernels import device
+from kernels.memory import MOST_SPARE_BYTES, MemoryPool
 
 
 def test_arrays_begin_on_cache_lines():
@@ -28,6 +29,17 @@ def test_memory_serves_again_once_nothing_refers_to_it():
     # more than the pool holds: whatever other tests left in it is taken too
     taken = [device.empty((1 << 20,), np.float64) for _ in range(40)]
     assert place in {array.ctypes.data for array in taken}
+
+
+def test_memory_larger_than_the_pool_serves_again_while_it_is_kept():
+    pool = MemoryPool()
+
+    with pool.keeping():
+        first = pool.empty((MOST_SPARE_BYTES + 64,), np.uint8)
+        place = first.ctypes.data
+        del first
+        assert pool.empty((MOST_SPARE_BYTES + 64,), np.uint8).ctypes.data == place
+    assert not pool.spare_bytes
 
 
 def test_two_arrays_never_share():

@@ -16,6 +16,7 @@ from pipeline.errors import InputError
 from pipeline.surface import recipes
 from pipeline.surface.holes import Measured, far_apart, measured_part
 from pipeline.surface.load import load_scan
+from pipeline.surface.no_data import sample, sample_without
 from pipeline.surface.readers import read_scan
 from pipeline.surface.scan import Scan
 from pipeline.surface.source import SurfaceSource
@@ -458,3 +459,20 @@ def test_the_mask_of_a_gwyddion_file(tmp_path: Path, use: Any, holes: int, told:
     assert (record.holes, record.masked_share) == (holes, 96 / (NY * NX))
     assert bool(record.warnings) == told
     assert np.isnan(heights.heights_um[-8:, 10:22]).all() == (holes > 0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 1.0])
+def test_a_sample_without_holes_is_that_of_the_rest(share: float) -> None:
+    """Of more values than are sampled, so that steps are longer than one."""
+    rng = np.random.default_rng(3)
+    values = rng.standard_normal((700, 900))
+    excluded = rng.random(values.shape) < share
+    np.testing.assert_array_equal(sample_without(values, excluded), sample(values[~excluded]))
+
+
+def test_a_scan_stays_as_it_was_read() -> None:
+    heights = skin()
+    heights[:10] = 0.0
+    read_so = heights.copy()
+    assert measured_part(scan(heights)).cropped[0] == 10
+    np.testing.assert_array_equal(heights, read_so)

@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 
+from pipeline.accuracy.checks import check_flank
 from pipeline.diffraction import power_spectrum
 from pipeline.optics import geometry
+from pipeline.optics.coherence import FLANK_DELTA_E
 from pipeline.optics.light import LaserLine, Light
 from pipeline.stages.polar import certificate
 from pipeline.surface.heightfield import HeightField
 from pipeline.tables.evaluate import table_evaluator
 from pipeline.tables.polar.layout import PolarLayout
-from pipeline.tables.polar.planning import anisotropy as scattering
 from pipeline.tables.polar.planning import plan
+from pipeline.tables.polar.planning.anisotropy import Scattering
+from pipeline.tables.polar.planning.flank import _cheapest, _Numbers
+from pipeline.tables.polar.planning.grids import DISTANCES
 from tests.tables.planned import SIGMA, config, exact_of, planned
 
 pytestmark = pytest.mark.slow
@@ -77,7 +81,7 @@ def test_the_stretch_follows_the_axis_of_a_grating() -> None:
     for angle in (0.0, 35.0, 90.0):
         along = x * np.cos(np.radians(angle)) + y * np.sin(np.radians(angle))
         field = HeightField(0.05 * np.cos(2.0 * np.pi * along / 1.2), (0.1, 0.1))
-        stretch, axis = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5))
+        stretch, axis = Scattering(power_spectrum.chebyshev_stack(field, SIGMA, 5.3, 16, 1e-5)).anisotropy()
         apart = np.angle(np.exp(2j * (axis - np.radians(angle)))) / 2.0
         assert abs(np.degrees(apart)) < 2.0
         # the seams of a rotated grating scatter too
@@ -87,5 +91,34 @@ def test_the_stretch_follows_the_axis_of_a_grating() -> None:
 def test_an_isotropic_surface_is_not_stretched() -> None:
     rng = np.random.default_rng(4)
     field = HeightField(rng.normal(0.0, 0.03, (120, 120)), (0.1, 0.1))
-    stretch, _ = scattering.anisotropy(power_spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5))
+    stretch, _ = Scattering(power_spectrum.chebyshev_stack(field, SIGMA, 4.9, 16, 1e-5)).anisotropy()
     assert stretch > 0.95
+
+
+@pytest.mark.parametrize("kind", ["mirror", "elaphe", "blazed"])
+def test_a_plan_keeps_the_limit_of_the_flank_with_a_margin(kind: str) -> None:
+    """A mirror needs no terms in |w| and its rings close, a grating both."""
+    found = config(surface={"recipe": {"kind": kind, "size_um": 12, "pitch_um": 0.1}})
+    table, _ = planned(found)
+    flank = check_flank(table_evaluator(table, found.radiometry), exact_of(found), found)
+    assert flank is not None
+    assert flank.colour.maximum <= 0.9 * FLANK_DELTA_E
+
+
+def test_the_flank_gets_the_numbers_of_the_fewest_bytes_that_keep_its_limit() -> None:
+    """Rings, terms and nodes are tried in the order of bytes, and those that cannot help are left out."""
+    numbers = [_Numbers(w, s, distance) for w in (8, 12) for s in (14, 16) for distance in DISTANCES]
+    tried = []
+
+    def needing(least: _Numbers) -> _Numbers | None:
+        def kept(one: _Numbers) -> bool:
+            tried.append(one)
+            return one.w_terms >= least.w_terms and one.s_nodes >= least.s_nodes and one.distance <= least.distance
+
+        return _cheapest(numbers, kept)
+
+    for least in (_Numbers(8, 14, 0.82), _Numbers(8, 16, 0.42), _Numbers(12, 14, 0.5), _Numbers(12, 16, 0.25)):
+        tried.clear()
+        assert needing(least) == least
+        assert len(tried) <= 11
+    assert needing(_Numbers(16, 14, 0.82)) is None

@@ -17,7 +17,8 @@ from pipeline.store.arrays import loading_bytes, saving_bytes
 from pipeline.tables.polar import spectral
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.planning import plan, trial
-from pipeline.tables.polar.planning.grid_search import GRID_SHARE, Grids
+from pipeline.tables.polar.planning.grid_search import GRID_SHARE
+from pipeline.tables.polar.planning.grids import Grids
 from pipeline.tables.polar.spectral_integral import IntegralSize
 
 # tables that the search for a grid measures, and tables of the curves that `validate` shows

@@ -20,6 +20,7 @@ from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.layout import PolarLayout
+from pipeline.tables.polar.planning import flank
 from pipeline.tables.polar.planning.grid_search import GridSearch
 from pipeline.tables.polar.planning.trial import Trial
 
@@ -136,13 +137,14 @@ def numbers(
 
 
 def choose(trial: Trial, scene: Scene | None, budget: Budget, layout: PolarLayout) -> Plan:
-    """Searches for the smallest grid that keeps the budget on the trial's window.
+    """Searches for the smallest grid that keeps the budget on the trial's window, and the flank's limit.
 
-    trial: made by `start` with the same scene, budget and layout.
+    trial: made by `start` with the same scene, budget and layout. It takes the terms and nodes that the flank needs.
     Returns the plan. Raises ResourceError if a grid needs more memory than is allowed.
     """
-    azimuths, rings, error = GridSearch(trial, layout, scene, budget.delta_e, budget.exposure_ru).run()
-    bake = trial.bake
+    bake, distance = flank.choose(trial, layout, scene, budget.delta_e)
+    trial.adopt(bake)
+    azimuths, rings, error = GridSearch(trial, layout, scene, budget.delta_e, budget.exposure_ru, distance).run()
     return Plan(bake.terms, bake.s_nodes, bake.w_terms, azimuths, rings, error)
 
 

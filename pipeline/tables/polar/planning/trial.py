@@ -1,5 +1,7 @@
 """Tables of the coherence window in the middle on several grids, whose errors the planner measures."""
 
+from functools import cached_property
+
 import numpy as np
 
 from pipeline.diffraction import dft_stack
@@ -11,6 +13,7 @@ from pipeline.surface.extent import Extent
 from pipeline.surface.heightfield import HeightField
 from pipeline.surface.windows import Places
 from pipeline.tables.polar.bake import PolarBake
+from pipeline.tables.polar.planning.anisotropy import Scattering
 from pipeline.tables.polar.table import PolarTable
 
 # the kernel of several windows keeps this many terms of each mode
@@ -39,6 +42,15 @@ class Trial:
         self._serves_all = serves_all(bake, field.extent, places)
         self.stack = bake.stack(field, progress, whole=self._serves_all)
         self._made: PolarPowerSpectrum | None = None
+
+    @cached_property
+    def scattering(self) -> Scattering:
+        """The azimuths into which the window in the middle scatters light."""
+        return Scattering(self.stack)
+
+    def adopt(self, bake: PolarBake) -> None:
+        """Takes settings with other nodes in s and terms in |w|, which the stack serves as well."""
+        self.bake, self._made = bake, None
 
     def power_spectrum(self, azimuths: Azimuths) -> PolarPowerSpectrum:
         """Computes E of the window on the given azimuths.
