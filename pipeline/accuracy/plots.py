@@ -14,6 +14,7 @@ from pipeline.accuracy.checks import MapCheck
 from pipeline.accuracy.convergence import Curve
 from pipeline.arrays import Array
 from pipeline.optics.colour import pixels
+from pipeline.report.images import PNG_LEVEL
 from pipeline.scene.model import Scene
 from pipeline.scene.summary import CELLS, SAMPLES
 from pipeline.scene.visited import rho_max, visited
@@ -28,7 +29,9 @@ def png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
     # without creation time and version, equal data give equal files
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    figure.savefig(
+        buffer, format="png", dpi=_DPI, metadata={"Software": None}, pil_kwargs={"compress_level": PNG_LEVEL}
+    )
     return buffer.getvalue()
 
 
@@ -87,7 +90,7 @@ def _weights(axes: Any, counted: tuple[Array, Array, Array]) -> Any:
 def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
     """Plots the map of one light: reference, table, and the CIELAB error between them.
 
-    show_ru: exposure of the two maps, RU. error_ru: exposure of the error, RU. light: its name for the titles.
+    show_ru: exposure of the two maps, RU. error_ru: that of the error, RU, which is [accuracy]'s. light: its name for the titles.
     """
     # a constrained layout would take as long as the drawing
     figure = Figure(figsize=(11.0, 3.7))
@@ -97,7 +100,7 @@ def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str)
     for axes, image, name in zip(panels, (check.reference, check.table), ("reference", "table"), strict=False):
         axes.imshow(pixels(image, show_ru), extent=extent)
         _axes_of_map(axes, f"{name}, {light}, {show_ru:g} RU")
-    error = np.where(check.views.inside, check.delta_e_image(error_ru), np.nan)
+    error = np.where(check.views.inside, check.delta_e, np.nan)
     shown = panels[2].imshow(
         error, extent=extent, cmap="magma", vmin=0.0, vmax=max(1e-3, np.nanpercentile(error, 99.5))
     )
