@@ -279,12 +279,10 @@ def check_map(
     unit, asked = config.radiometry.unit, config.accuracy.exposure_ru
     colours = evaluate(wi, wr) / unit, truth / unit
     errors = {exposure: delta_e(*colours, exposure) for exposure in exposures(asked)}
-    return MapCheck(
-        views,
-        *(views.image(values) for values in (*colours, errors[asked])),
-        [statistics(error, exposure) for exposure, error in errors.items()],
-        [largest_error(config, (wi, wr), colours, error, exposure) for exposure, error in errors.items()],
-    )
+    table, exact, error = (views.image(values) for values in (*colours, errors[asked]))
+    means = [statistics(found, exposure) for exposure, found in errors.items()]
+    largest = [largest_error(config, (wi, wr), colours, found, exposure) for exposure, found in errors.items()]
+    return MapCheck(views, table, exact, error, means, largest)
 
 
 def check_table(
