@@ -11,7 +11,7 @@ from pipeline.diffraction.reference import Reference
 from pipeline.errors import AccuracyError
 from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_DELTA_E, FLANK_RU, FLANK_WIDTHS, lobe_width
-from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e
+from pipeline.optics.colour import ColourError, colour_error, colour_errors, delta_e, exposures, statistics
 from pipeline.optics.light import trapezoid
 from pipeline.progress import Progress, silent
 from pipeline.scene.pairs import border_pairs, flank_pairs, random_pairs
@@ -147,22 +147,23 @@ class LargestError:
 
 
 def largest_error(
-    config: Config, directions: tuple[Array, Array], found: Array, truth: Array, exposure_ru: float
+    config: Config,
+    directions: tuple[Array, Array],
+    colours: tuple[Array, Array],
+    errors: Array,
+    exposure_ru: float,
 ) -> LargestError:
     """Finds the largest CIELAB error.
 
-    config: its light, window and material are read. directions: unit vectors wi, wr (n, 3). found, truth: XYZ (n, 3).
-    exposure_ru: exposure at which colours are compared, RU.
+    config: its light and window are read. directions: unit vectors wi, wr (n, 3).
+    colours: XYZ of the table and exact XYZ (n, 3), RU. errors: their CIELAB differences (n,) at `exposure_ru`, RU.
     """
-    unit = config.radiometry.unit
-    errors = delta_e(found / unit, truth / unit, exposure_ru)
     worst = int(np.argmax(errors))
     wi, wr = (one[worst] for one in directions)
     u, v, _ = geometry.uvw(wi, wr)
     widths = float(np.hypot(u, v)) / lobe_width(config.light.middle_nm, config.coherence.sigma_um)
     light, view = (float(np.degrees(np.arccos(min(1.0, one[2])))) for one in (wi, wr))
-    x, y, z = found[worst] / unit
-    true_x, true_y, true_z = truth[worst] / unit
+    (x, y, z), (true_x, true_y, true_z) = (one[worst] for one in colours)
     return LargestError(
         delta_e=float(errors[worst]),
         exposure_ru=exposure_ru,
@@ -217,9 +218,10 @@ def _flank_pairs(config: Config, windows: int) -> tuple[Array, Array]:
 
 
 def _flank(interpolated: Array, truth: Array, config: Config, wi: Array, wr: Array) -> FlankCheck:
-    found, unit = never_negative(interpolated), config.radiometry.unit
-    colour = colour_error(found / unit, truth / unit, FLANK_RU)
-    largest = largest_error(config, (wi, wr), found, truth, FLANK_RU)
+    unit = config.radiometry.unit
+    colours = never_negative(interpolated) / unit, truth / unit
+    errors = delta_e(*colours, FLANK_RU)
+    colour, largest = statistics(errors, FLANK_RU), largest_error(config, (wi, wr), colours, errors, FLANK_RU)
     return FlankCheck(len(wi), FLANK_WIDTHS, colour, largest, colour.maximum <= FLANK_DELTA_E)
 
 
@@ -243,19 +245,16 @@ def _border_pairs(config: Config, windows: int) -> tuple[Array, Array]:
 class MapCheck:
     """Errors of a table against the reference on the map of one light.
 
-    views: the map. table, reference: XYZ (size, size, 3), RU. colour: CIELAB errors, one for each exposure.
-    largest: the largest of them at each exposure.
+    views: the map. table, reference: XYZ (size, size, 3), RU. delta_e: CIELAB error (size, size) at the exposure of
+    [accuracy]. colour: CIELAB errors, one for each exposure. largest: the largest of them at each exposure.
     """
 
     views: Map
     table: Array
     reference: Array
+    delta_e: Array
     colour: list[ColourError]
     largest: list[LargestError]
-
-    def delta_e_image(self, exposure_ru: float) -> Array:
-        """Computes the CIELAB error (size, size) at an exposure, RU."""
-        return delta_e(self.table, self.reference, exposure_ru)
 
 
 def check_map(
@@ -277,10 +276,13 @@ def check_map(
     wr = views.views()
     wi = np.broadcast_to(light, wr.shape)
     truth = reference.xyz(config.light, config.material, wi, wr, progress=progress)
-    found = evaluate(wi, wr)
-    unit, errors = config.radiometry.unit, _colour_errors(config, found, truth)
-    largest = [largest_error(config, (wi, wr), found, truth, error.exposure_ru) for error in errors]
-    return MapCheck(views, views.image(found / unit), views.image(truth / unit), errors, largest)
+    unit, asked = config.radiometry.unit, config.accuracy.exposure_ru
+    colours = evaluate(wi, wr) / unit, truth / unit
+    errors = {exposure: delta_e(*colours, exposure) for exposure in exposures(asked)}
+    table, exact, error = (views.image(values) for values in (*colours, errors[asked]))
+    means = [statistics(found, exposure) for exposure, found in errors.items()]
+    largest = [largest_error(config, (wi, wr), colours, found, exposure) for exposure, found in errors.items()]
+    return MapCheck(views, table, exact, error, means, largest)
 
 
 def check_table(

@@ -2,6 +2,9 @@
 
 import io
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -10,7 +13,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from pipeline.accuracy.checks import MapCheck
+from pipeline.accuracy.checks import MAP_SIZE, MapCheck
 from pipeline.accuracy.convergence import Curve
 from pipeline.arrays import Array
 from pipeline.optics.colour import pixels
@@ -21,6 +24,8 @@ from pipeline.surface.heightfield import HeightField
 
 _DPI = 110
 _MOST_PIXELS = 512
+# as small as at zlib's usual level 6, in less time
+_PNG_LEVEL = 3
 
 
 def png(figure: Figure) -> bytes:
@@ -28,7 +33,9 @@ def png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
     # without creation time and version, equal data give equal files
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    figure.savefig(
+        buffer, format="png", dpi=_DPI, metadata={"Software": None}, pil_kwargs={"compress_level": _PNG_LEVEL}
+    )
     return buffer.getvalue()
 
 
@@ -84,26 +91,54 @@ def _weights(axes: Any, counted: tuple[Array, Array, Array]) -> Any:
     return axes.pcolormesh(x, y, np.where(weight > 0.0, weight, np.nan).T, norm=LogNorm(), cmap="viridis")
 
 
-def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
-    """Plots the map of one light: reference, table, and the CIELAB error between them.
+@dataclass(frozen=True)
+class _Comparison:
+    """A figure of three maps; `drawing` is held while it is filled and drawn."""
 
-    show_ru: exposure of the two maps, RU. error_ru: exposure of the error, RU. light: its name for the titles.
-    """
+    figure: Figure
+    panels: Sequence[Any]
+    images: Sequence[Any]
+    drawing: Lock
+
+
+@cache
+def _comparison() -> _Comparison:
+    """Makes the figure of all map comparisons: its axes take as long as to draw it."""
     # a constrained layout would take as long as the drawing
     figure = Figure(figsize=(11.0, 3.7))
     panels = figure.subplots(1, 3)
     figure.subplots_adjust(left=0.05, right=0.92, bottom=0.13, top=0.9, wspace=0.25)
-    extent = (-1, 1, -1, 1)
-    for axes, image, name in zip(panels, (check.reference, check.table), ("reference", "table"), strict=False):
-        axes.imshow(pixels(image, show_ru), extent=extent)
-        _axes_of_map(axes, f"{name}, {light}, {show_ru:g} RU")
-    error = np.where(check.views.inside, check.delta_e_image(error_ru), np.nan)
-    shown = panels[2].imshow(
-        error, extent=extent, cmap="magma", vmin=0.0, vmax=max(1e-3, np.nanpercentile(error, 99.5))
+    blank = (
+        np.zeros((MAP_SIZE, MAP_SIZE, 3), np.uint8),
+        np.zeros((MAP_SIZE, MAP_SIZE, 3), np.uint8),
+        np.zeros((MAP_SIZE, MAP_SIZE)),
     )
-    _axes_of_map(panels[2], f"CIELAB error, {error_ru:g} RU")
-    figure.colorbar(shown, cax=figure.add_axes((0.935, 0.13, 0.012, 0.77)), label="ΔE*ab (1976)")
-    return png(figure)
+    images = [axes.imshow(one, extent=(-1, 1, -1, 1), cmap="magma") for axes, one in zip(panels, blank, strict=True)]
+    for axes in panels:
+        _axes_of_map(axes, "")
+    figure.colorbar(images[2], cax=figure.add_axes((0.935, 0.13, 0.012, 0.77)), label="ΔE*ab (1976)")
+    return _Comparison(figure, panels, images, Lock())
+
+
+def map_comparison(check: MapCheck, show_ru: float, error_ru: float, light: str) -> bytes:
+    """Plots the map of one light: reference, table, and the CIELAB error between them.
+
+    show_ru: exposure of the two maps, RU. error_ru: that of the error, RU, which is [accuracy]'s. light: its name for
+    the titles.
+    """
+    drawn, error = _comparison(), np.where(check.views.inside, check.delta_e, np.nan)
+    shown = (pixels(check.reference, show_ru), pixels(check.table, show_ru), error)
+    titles = (
+        f"reference, {light}, {show_ru:g} RU",
+        f"table, {light}, {show_ru:g} RU",
+        f"CIELAB error, {error_ru:g} RU",
+    )
+    with drawn.drawing:
+        for axes, image, data, title in zip(drawn.panels, drawn.images, shown, titles, strict=True):
+            image.set_data(data)
+            axes.set_title(title)
+        drawn.images[2].set_clim(0.0, max(1e-3, np.nanpercentile(error, 99.5)))
+        return png(drawn.figure)
 
 
 def convergence(curves: Sequence[Curve], exposure_ru: float) -> bytes:

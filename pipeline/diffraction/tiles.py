@@ -61,6 +61,8 @@ class Tiles:
         """
         last, azimuths = self.grid.rings.count - 1, self.grid.azimuths.count
         found = np.ones(len(ring), bool)
+        if self.covered.all():
+            return found
         for row in np.floor(ring).astype(int) + np.arange(-1, 3)[:, None]:
             # beyond the origin the opposite half turn, mirrored at the last ring
             mirrored = last - np.abs(last - np.abs(row))

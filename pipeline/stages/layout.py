@@ -26,7 +26,8 @@ class Layout:
     stored_of: returns the table that the bundle's textures hold.
     study: returns the curves of error against each setting that `validate` shows, from config, inputs, the table's
         evaluator and the map on which errors are measured. studied: returns the config with the light and the
-        material under which they are measured. study_remark: a sentence on them for the report.
+        material under which they are measured, where these are not a config's own and the curves depend on the
+        transform alone; else None. study_remark: a sentence on them for the report.
     sizes: computes memory and time of the layout's stages before they begin.
     ways_out: keys of [table] that a refusal of too much work may propose to change.
     settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
@@ -47,7 +48,7 @@ class Layout:
     table_of: Callable[[Inputs], Table]
     stored_of: Callable[[Inputs], Table]
     study: Callable[[Config, Inputs, Evaluator, CoarseMap], Study]
-    studied: Callable[[Config], Config]
+    studied: Callable[[Config], Config] | None
     study_remark: str
     sizes: Callable[[Foreseen], LayoutSizes]
     ways_out: tuple[WayOut, ...]

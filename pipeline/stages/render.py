@@ -80,4 +80,4 @@ def _work(config: Config) -> str:
     return f"{len(config.render.lights)} map(s) of {config.render.size}²"
 
 
-RENDER = Stage("render", 4, ("table", "textures"), _parameters, _produce, uses_device=True, work=_work)
+RENDER = Stage("render", 5, ("table", "textures"), _parameters, _produce, uses_device=True, work=_work)

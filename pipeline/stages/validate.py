@@ -94,12 +94,15 @@ def _once(inputs: Inputs, name: str, of: str, *arguments: Any) -> bytes:
     return inputs.session.derived(name, lambda: Small(_picture(of, *arguments))).value
 
 
+def _studied(layout: Layout, config: Config) -> Config:
+    """Returns the config whose light and material the curves have."""
+    return config if layout.studied is None else layout.studied(config)
+
+
 def _name_of_curves(layout: Layout, config: Config, inputs: Inputs) -> str:
     """Names the curves after all that they depend on."""
-    studied = layout.studied(config)
-    of = {**colour_parameters(studied), "light": config.render.lights[0].model_dump()}
-    # curves of a table that is itself made for a light or a material are those of this table alone
-    table = layout.transform.name if studied != config else "table"
+    of = {**colour_parameters(_studied(layout, config)), "light": config.render.lights[0].model_dump()}
+    table = "table" if layout.studied is None else layout.transform.name
     return f"curves of {inputs[table].key} {digest.of_json(of)}"
 
 
@@ -107,7 +110,7 @@ def _curves(
     layout: Layout, config: Config, inputs: Inputs, baked: Evaluator, reference: Reference, progress: Progress
 ) -> Small[list[convergence.Curve]]:
     """Computes the error against each setting of the table, on a coarse map under the first light."""
-    studied, first = layout.studied(config), config.render.lights[0]
+    studied, first = _studied(layout, config), config.render.lights[0]
     coarse = convergence.CoarseMap(reference, studied, render.light_direction(first), map_radius(config.scene, first))
     study, curves = layout.study(studied, inputs, baked, coarse), []
     for i, setting in enumerate(study):
@@ -136,7 +139,7 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
     table = {"table": sizes.table_bytes, "textures": sizes.stored_bytes}
     kept = {**spare(sizes.freed_bytes, sizes.study.buffer), **heap(sizes.transform_bytes, sizes.table_bytes)}
     answering = reference.answering(views, wavelengths, config.material)
-    maps = {"maps of all lights": lights * 2 * checks.MAP_SIZE**2 * 3 * 8, **answering}
+    maps = {"maps of all lights": lights * 7 * checks.MAP_SIZE**2 * 8, **answering}
     arrays = largest(
         {"reference": reference.nbytes, **foreseen.reading(**table)},
         {"reference": reference.nbytes, **table, **foreseen.reading(transform=sizes.transform_bytes)},
@@ -159,4 +162,4 @@ def _work(config: Config) -> str:
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render")
-    return Stage("validate", 9, inputs, _parameters, _produce, uses_device=True, work=_work)
+    return Stage("validate", 10, inputs, _parameters, _produce, uses_device=True, work=_work)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -84,7 +85,7 @@ class Map:
         x, y = np.meshgrid(centre, -centre)
         return x, y
 
-    @property
+    @cached_property
     def inside(self) -> np.ndarray:
         """Mask of the pixels that are views, bool (size, size)."""
         x, y = self._axes()
