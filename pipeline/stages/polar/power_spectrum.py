@@ -126,4 +126,4 @@ def _work(config: Config) -> str:
     return f"a grid for a mean dE of {config.budget_delta_e:g}"
 
 
-POWER_SPECTRUM = Stage("power_spectrum", 7, ("surface",), _parameters, _produce, uses_device=True, work=_work)
+POWER_SPECTRUM = Stage("power_spectrum", 8, ("surface",), _parameters, _produce, uses_device=True, work=_work)

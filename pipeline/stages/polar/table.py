@@ -95,4 +95,4 @@ def _work(config: Config) -> str:
     return f"{layout.rings} rings x {layout.azimuths} azimuths"
 
 
-TABLE = Stage("table", 8, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)
+TABLE = Stage("table", 9, ("surface", "power_spectrum"), _parameters, _produce, uses_device=True, work=_work)

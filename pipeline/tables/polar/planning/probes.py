@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
-from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
+from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings, last_ring
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_RU, FLANK_WIDTHS, lobe_width
@@ -105,7 +105,7 @@ class FlankProbes:
         if not len(self._uvw):
             return 0.0
         inner, power = self._inner
-        rings = Rings(ceil(inner.rho_max / distance) + 1, 4.0 * inner.rho_max, inner.rho_max)
+        rings = Rings(ceil(last_ring(inner.rho_max) / distance) + 1, 4.0 * inner.rho_max, inner.rho_max)
         table = inner.table(power, rings, inner.rules(rings.rho()))
         found = self._factor * np.nan_to_num(table.look_up(self._uvw))
         return float(delta_e(np.maximum(found, 0.0), self._exact, FLANK_RU).max())
