@@ -57,6 +57,9 @@ def _measured(
     drawn = {"surface": drawing.submit(_once, inputs, f"plot of {inputs['surface'].key}", "height_map", field)}
     # errors are those of the textures that a bundle holds; settings are varied of the table that they are made of
     evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
+    if config.scene is not None:
+        tiles = None if layout.tiles_of is None else layout.tiles_of(inputs["table"])
+        drawn["scene"] = drawing.submit(_picture, "visited_directions", config.scene, tiles)
     reference = surface.reference_of(config, inputs, progress)
     exposures = (config.render.exposure_ru, config.accuracy.exposure_ru)
     radii = [render.map_radius(config, light) for light in config.render.lights]
@@ -160,4 +163,4 @@ def _work(config: Config) -> str:
 def stage_of(layout: Layout) -> Stage:
     """Returns the validation stage of a layout, whose inputs include the layout's transform."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render")
-    return Stage("validate", 9, inputs, _parameters, _produce, uses_device=True, work=_work)
+    return Stage("validate", 10, inputs, _parameters, _produce, uses_device=True, work=_work)

@@ -23,6 +23,7 @@ def test_a_mesh_under_the_sun_is_baked_and_certified(tool: Tool) -> None:
     assert certificate["measured"] <= certificate["delta_e"] == 0.5
     assert certificate["random"]["directions"] == 2000
     assert certificate["border"]["directions"] > 0
+    assert "What the scene visits." in (tool.out / "small" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
