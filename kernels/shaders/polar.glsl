@@ -16,7 +16,7 @@ const int STARTS[(RINGS + BAND - 1) / BAND * ((AZIMUTHS + SECTOR - 1) / SECTOR)]
 const int TEXTURES = 6;  // images
 const int TERMS = 8;  // Chebyshev polynomials in |w|
 const bool LOW_RANK = false;  // true: `basis` mixes outputs; false: each output is one term of one channel
-const float RHO_MAX = 2.0;  // of the last ring; beyond it, nothing was computed
+const float RHO_MAX = 2.0;  // largest radius that is looked up; beyond it, nothing is known
 const float R0 = 0.05;
 const float STEP = 0.0318;
 const float AXIS = 0.0;  // (u', v') is (u, v) turned by -AXIS, radians
@@ -44,7 +44,7 @@ int texel(int ring, int knot, bool opposite) {
 }
 
 // X, Y, Z at (u, v, w) = -wi - wr, without C cos(theta_i); `computed` is false, and all are 0, where nothing is known:
-// beyond the last ring, and where one of the 4 x 4 texels is in an absent tile.
+// beyond RHO_MAX, and where one of the 4 x 4 texels is in an absent tile.
 vec3 table_value(vec3 uvw, out bool computed) {
     float rho = length(uvw.xy);
     computed = rho <= RHO_MAX * 1.000001;

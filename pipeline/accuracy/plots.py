@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
@@ -16,6 +17,7 @@ from matplotlib.patches import Circle
 from pipeline.accuracy.checks import MAP_SIZE, MapCheck
 from pipeline.accuracy.convergence import Curve
 from pipeline.arrays import Array
+from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
 from pipeline.optics.colour import pixels
 from pipeline.scene.model import Scene
 from pipeline.scene.summary import CELLS, SAMPLES
@@ -64,8 +66,8 @@ def _axes_of_map(axes: Any, title: str) -> None:
     axes.set_yticks([-1, 0, 1])
 
 
-def visited_directions(scene: Scene) -> bytes:
-    """Plots what a scene visits: its weight over (u, v), and over |(u, v)| and |w|."""
+def visited_directions(scene: Scene, tiles: Tiles | None = None) -> bytes:
+    """Plots what a scene visits: its weight over (u, v), over a table's tiles, and over |(u, v)| and |w|."""
     found = visited(scene, SAMPLES)
     figure = Figure(figsize=(10.0, 4.4), layout="constrained")
     over_uv, over_w = figure.subplots(1, 2)
@@ -73,7 +75,9 @@ def visited_directions(scene: Scene) -> bytes:
     rho, weight = np.hypot(u, v), 100.0 * found.weight
     limits = ((-2.0, 2.0), (-2.0, 2.0))
     _weights(over_uv, np.histogram2d(u, v, CELLS, limits, weights=weight))
-    # 2 is the horizon of both directions; the second circle ends the rings of a table
+    if tiles is not None:
+        over_uv.add_collection(LineCollection(_outlines(tiles), colors="0.75", linewidths=0.4, zorder=0))
+    # 2 is the horizon of both directions; the second circle ends what a table answers
     for radius, style in ((2.0, "-"), (rho_max(scene), "--")):
         over_uv.add_patch(Circle((0.0, 0.0), radius, fill=False, linestyle=style, color="0.4", linewidth=0.8))
     over_uv.set(xlabel="u", ylabel="v", title="visited (u, v)", aspect="equal")
@@ -83,6 +87,20 @@ def visited_directions(scene: Scene) -> bytes:
     over_w.set(xlabel="|(u, v)|", ylabel="|w|", title="visited |w| at each ring")
     figure.colorbar(image, ax=over_w, label="weight of a cell (%)")
     return png(figure)
+
+
+def _outlines(tiles: Tiles) -> list[Array]:
+    """Computes the outlines (points, 2) of the tiles in (u, v): arcs along their first and last rings."""
+    rho, found = tiles.grid.rings.rho(), []
+    # the last sector ends where the first begins
+    phi = np.append(tiles.grid.azimuths.phi(), tiles.grid.azimuths.phi()[0])
+    for band, sector in np.argwhere(tiles.covered):
+        ends = rho[[RINGS * band, min(RINGS * (band + 1), len(rho) - 1)]]
+        along = phi[AZIMUTHS * sector : AZIMUTHS * (sector + 1) + 1]
+        angle, radius = np.concatenate([along, along[::-1]]), np.repeat(ends, len(along))
+        outline = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+        found.append(np.concatenate([outline, outline[:1]]))
+    return found
 
 
 def _weights(axes: Any, counted: tuple[Array, Array, Array]) -> Any:

@@ -120,12 +120,30 @@ def provenance(config: Config, keys: Mapping[str, str]) -> Provenance:
 
 
 def resolved(config: Config) -> dict[str, Any]:
-    """Returns the whole config as JSON, each file by name and SHA-256, without folders of this machine."""
+    """Returns the whole config as JSON, each file by name and SHA-256, without folders of this machine.
+
+    "scene" remains a [scene], whose files are named there and listed with their SHA-256 in "scene_files".
+    """
     resolved = config.model_dump(mode="json")
     resolved["surface"]["path"] = None if config.surface.path is None else _named_file(config.surface.path)
     resolved["spectrum"]["illuminant"] = _illuminant(config)
     resolved["material"]["metal"] = _file_or_name(config.material.metal)
+    if config.scene is not None:
+        resolved["scene_files"] = _named_scene_files(resolved["scene"])
     return resolved
+
+
+def _named_scene_files(section: dict[str, Any]) -> list[dict[str, Any]]:
+    """Names the files of a [scene] without their folders, in its place. Returns names and SHA-256."""
+    if section["cameras"] is not None:
+        # both are no [scene]
+        del section["views"]
+    found = []
+    for entry in (*section["lights"], section["mesh"] or {}):
+        if "path" in entry:
+            found.append(_named_file(entry["path"]))
+            entry["path"] = found[-1]["file"]
+    return found
 
 
 def _illuminant(config: Config) -> dict[str, Any]:

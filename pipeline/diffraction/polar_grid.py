@@ -18,6 +18,10 @@ import numpy as np
 from pipeline.arrays import Array
 
 RHO_MAX = 2.0  # |(u, v)| of grazing light and a view in the same direction
+# how far rings go on beyond what is looked up. The spline is mirrored at the last ring, an error that falls by 0.27
+# from ring to ring. Mean dE at 7500 RU on the border of scenes, under the sun at 30 degrees with views to 40, and
+# under a normal light with views to 15: 0.24 and 0.19 at 1, 0.044 and 0.079 at 1.08, 0.040 and 0.029 at 1.15
+BEYOND = 1.15
 TILE = 32  # azimuths fill whole vectors of the device in both half turns
 
 
@@ -51,13 +55,18 @@ class Azimuths:
         return np.asarray((turns % 1.0) * self.count % self.count)
 
 
+def last_ring(rho_max: float) -> float:
+    """Computes |(u, v)| of the last ring of a grid for directions up to `rho_max`, both dimensionless."""
+    return min(BEYOND * rho_max, RHO_MAX)
+
+
 @dataclass(frozen=True)
 class Rings:
     """The rings of a polar grid, rho = r0 sinh(i dx).
 
-    count: number of rings; the first is at rho = 0 and the last at `rho_max`.
+    count: number of rings; the first is at rho = 0 and the last at `last`.
     r0: radius below which the rings are evenly spaced, dimensionless. Above it, their ratio is constant.
-    rho_max: |(u, v)| of the last ring, dimensionless.
+    rho_max: largest |(u, v)| that is looked up, dimensionless.
     """
 
     count: int
@@ -65,14 +74,19 @@ class Rings:
     rho_max: float = RHO_MAX
 
     @property
+    def last(self) -> float:
+        """|(u, v)| of the last ring, dimensionless."""
+        return last_ring(self.rho_max)
+
+    @property
     def step(self) -> float:
         """Step dx of arsinh(rho / r0) from ring to ring."""
-        return asinh(self.rho_max / self.r0) / (self.count - 1)
+        return asinh(self.last / self.r0) / (self.count - 1)
 
     def rho(self) -> Array:
         """Computes the radius of every ring (count,), dimensionless; the inverse is `ring_from_rho`."""
         found = self.r0 * np.sinh(np.arange(self.count) * self.step)
-        found[-1] = self.rho_max
+        found[-1] = self.last
         return np.asarray(found)
 
     def ring_from_rho(self, rho: Array) -> Array:
@@ -93,6 +107,7 @@ class PolarGrid:
         return self.rings.count * self.azimuths.count
 
     def area(self) -> Array:
-        """Computes the area of (u, v) around every texel (rings, azimuths), dimensionless."""
+        """Computes the area of (u, v) around every texel (rings, azimuths), dimensionless; 0 beyond `rho_max`."""
         rho, phi = self.rings.rho(), np.unwrap(self.azimuths.phi())
-        return np.outer(rho * np.gradient(rho), np.abs(np.gradient(phi)))
+        across = np.where(rho <= self.rings.rho_max, rho * np.gradient(rho), 0.0)
+        return np.outer(across, np.abs(np.gradient(phi)))

@@ -74,7 +74,7 @@ class Tiles:
         return found
 
     def covered_share(self) -> float:
-        """Computes the share of the disc of (u, v) up to the last ring whose texels are in covered tiles."""
+        """Computes the share of the disc of (u, v) up to rho_max whose texels are in covered tiles."""
         area = self.grid.area()
         return float(np.sum(area[self.mask()]) / np.sum(area))
 

@@ -19,10 +19,12 @@ from pipeline.scene.visited import visited
 _WIDEST_LIGHT_DEG = 85.0
 # a draw is repeated until enough lights are above the horizon of what the pixels see
 _MOST_DRAWS = 64
-# the set of directions in which those of a flank or a border are looked for
+# the set of directions in which those of a flank are looked for
 _VISITED = 200_000
 # cells of (u, v) along its range of 4, in which the border of the visited directions is found
 _BORDER_CELLS = 128
+# pairs drawn for each that is wanted on the border; gaps between cells that are closed
+_BORDER_DRAWS, _CLOSED = 250, 5
 
 
 def random_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Array]:
@@ -39,7 +41,9 @@ def random_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Arr
 
 
 def border_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Array]:
-    """Draws pairs of a scene in the outermost of the cells of (u, v) that it visits, 1/32 wide.
+    """Draws pairs of a scene in the outermost cells of (u, v), 1/32 wide, that any of many pairs meet.
+
+    Under lights of some extent pairs become rare towards the border: one in three hundred is in these cells.
 
     Returns unit vectors wi, wr, at most (count, 3) each; none without a scene, whose border is the horizon.
     """
@@ -47,15 +51,14 @@ def border_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Arr
         return np.empty((0, 3)), np.empty((0, 3))
     from scipy import ndimage
 
-    found = visited(scene, _VISITED)
-    cells = np.zeros((_BORDER_CELLS, _BORDER_CELLS), bool)
-    # a cell that lies within the gap of a sample may be visited between samples
-    for across, up in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
-        cells[_cell(found.uvw + found.gap[:, None] * [across, up, 0])] = True
+    wi, wr = random_pairs(scene, _BORDER_DRAWS * count, seed)
+    cell, met = _cell(geometry.uvw(wi, wr)), np.zeros((_BORDER_CELLS, _BORDER_CELLS), bool)
+    met[cell] = True
+    # cells that none of the pairs meets by chance are no border
+    met = ndimage.binary_closing(met, np.ones((_CLOSED, _CLOSED)))
     # beyond |(u, v)| = 2 there is nothing to see
-    inner = ndimage.binary_erosion(cells, np.ones((3, 3)), border_value=1)
-    wi, wr = random_pairs(scene, 50 * count, seed)
-    outermost = np.flatnonzero(~inner[_cell(geometry.uvw(wi, wr))])[:count]
+    inner = ndimage.binary_erosion(met, np.ones((3, 3)), border_value=1)
+    outermost = np.flatnonzero(~inner[cell])[:count]
     return wi[outermost], wr[outermost]
 
 

@@ -80,4 +80,4 @@ def need(foreseen: Foreseen, sizes: LayoutSizes) -> Need:
 def stage_of(layout: Layout) -> Stage:
     """Returns the bundle stage of a layout; its inputs are all stages before, because the manifest describes each."""
     inputs = ("surface", layout.transform.name, "table", "textures", "render", "validate")
-    return Stage("bundle", 7, inputs, _parameters, _produce, work=lambda _config: "tables, maps and report")
+    return Stage("bundle", 8, inputs, _parameters, _produce, work=lambda _config: "tables, maps and report")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pipeline.accuracy.convergence import CoarseMap, Study
 from pipeline.arrays import Array
 from pipeline.config.models import Config
+from pipeline.diffraction.tiles import Tiles
 from pipeline.stages.foreseen import Foreseen, LayoutSizes, WayOut
 from pipeline.stages.stage import Inputs, Stage, Summary
 from pipeline.store.store import Artifact
@@ -33,6 +34,7 @@ class Layout:
     settings: returns rows (name, value) for the report, from the summaries of the transform and of the table.
     stored: returns such rows on the textures, from the config and the loss in their summary.
     prepare: makes the table's part of a bundle.
+    tiles_of: returns the tiles of the table in (u, v), from its artifact, where it has some.
     at_wavelengths: makes the function (uvw, lambda_nm) -> |P|^2, (n, 3), (L,) -> (n, L), from the transform's
         artifact, for a [table] that holds wavelengths.
 
@@ -55,4 +57,5 @@ class Layout:
     settings: Callable[[Summary, Summary], list[list[str]]]
     stored: Callable[[Config, dict[str, Any]], list[list[str]]]
     prepare: "Callable[[Config, Inputs], Prepared]"
+    tiles_of: Callable[[Artifact], Tiles] | None = None
     at_wavelengths: Callable[[Artifact], Callable[[Array, Array], Array]] | None = None

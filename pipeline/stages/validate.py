@@ -58,6 +58,9 @@ def _measured(
     drawn = {"surface": drawing.submit(_once, inputs, f"plot of {inputs['surface'].key}", "height_map", field)}
     # errors are those of the textures that a bundle holds; settings are varied of the table that they are made of
     evaluate, baked = (table_evaluator(of(inputs), config.radiometry) for of in (layout.stored_of, layout.table_of))
+    if config.scene is not None:
+        tiles = None if layout.tiles_of is None else layout.tiles_of(inputs["table"])
+        drawn["scene"] = drawing.submit(_picture, "visited_directions", config.scene, tiles)
     reference = surface.reference_of(config, inputs, progress)
     exposures = (config.render.exposure_ru, config.accuracy.exposure_ru)
     radii = [map_radius(config.scene, light) for light in config.render.lights]

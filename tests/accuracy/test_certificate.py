@@ -1,5 +1,7 @@
 """Certificates: planned tables keep their budget, and tables that miss it are refused."""
 
+from typing import Any
+
 import pytest
 
 from pipeline.accuracy.checks import check_border, check_flank
@@ -43,14 +45,24 @@ def test_lights_whose_mirror_direction_is_not_seen_have_no_flank() -> None:
     assert check_flank(exact_of(found).xyz, exact_of(found), found) is None
 
 
-def test_a_scene_has_a_border_where_a_table_errs_more_and_which_is_measured_apart() -> None:
-    """The spline is mirrored at the last ring, at the largest |(u, v)| of a scene: 0.20 there, 0.06 on all."""
-    found = config(scene={"lights": [{"kind": "sun", "theta_deg": 30}], "views": {"theta_max_deg": 40}})
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"lights": [{"kind": "sun", "theta_deg": 30}], "views": {"theta_max_deg": 40}},
+        # half of its border is at the largest |(u, v)|
+        {"lights": [{"theta_deg": 0}], "views": {"theta_max_deg": 15}},
+        # few pairs lie on its border
+        {"lights": [{"kind": "range", "theta_deg": [0, 60]}]},
+    ],
+)
+def test_the_border_of_a_scene_is_measured_apart_and_within_the_budget(scene: dict[str, Any]) -> None:
+    """The mean error is 0.24 and 0.19 on the first two if the spline is mirrored at the largest |(u, v)|."""
+    found = config(scene=scene)
     table, _ = planned(found)
     border = check_border(table_evaluator(table, found.radiometry), exact_of(found), found)
     assert border is not None
-    assert border.directions == 400
-    assert next(error.mean for error in border.colour if error.exposure_ru == 7500.0) <= 0.3
+    assert 250 <= border.directions <= 400
+    assert next(error.mean for error in border.colour if error.exposure_ru == 7500.0) <= 0.1
     assert check_border(table_evaluator(table, found.radiometry), exact_of(found), config()) is None
 
 

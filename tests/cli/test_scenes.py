@@ -23,6 +23,11 @@ def test_a_mesh_under_the_sun_is_baked_and_certified(tool: Tool) -> None:
     assert certificate["measured"] <= certificate["delta_e"] == 0.5
     assert certificate["random"]["directions"] == 2000
     assert certificate["border"]["directions"] > 0
+    assert tool("verify", tool.bundle()).code == 0
+    config = json.loads((tool.bundle() / "manifest.json").read_text(encoding="utf-8"))["provenance"]["config"]
+    assert config["scene"]["mesh"]["path"] == "tube.obj"
+    assert [entry["file"] for entry in config["scene_files"]] == ["tube.obj"]
+    assert "What the scene visits." in (tool.out / "small" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -30,10 +30,11 @@ def test_stretched_azimuths_are_denser_about_their_axis() -> None:
     assert gap[across] / gap[at_axis] == pytest.approx(16.0, rel=0.1)
 
 
-def test_rings_extend_from_zero_to_the_rim_and_ring_from_rho_inverts_rho() -> None:
-    rings = Rings(50, 0.1, 1.7)
+def test_rings_extend_from_zero_beyond_what_is_looked_up_and_ring_from_rho_inverts_rho() -> None:
+    rings = Rings(50, 0.1, 1.2)
     rho = rings.rho()
-    assert (rho[0], rho[-1]) == (0.0, 1.7)
+    assert (rho[0], rho[-1]) == pytest.approx((0.0, 1.15 * 1.2))
+    assert Rings(50, 0.1, 1.9).last == 2.0
     np.testing.assert_allclose(rings.ring_from_rho(rho), np.arange(50), atol=1e-9)
     # evenly spaced near the origin, in a constant ratio at the rim
     assert (rho[2] - rho[1]) / rho[1] == pytest.approx(1.0, rel=0.02)

@@ -12,8 +12,9 @@ from pipeline.scene import mesh, seen
 from pipeline.scene.model import Mesh, Scene
 from pipeline.scene.pairs import random_pairs
 from pipeline.scene.visited import rho_max, visited
+from tests.cli.tool import REPOSITORY
 from tests.scene.scenes import scene
-from tests.scene.tube import AMPLITUDE, LENGTH, RADIUS, write_glb, write_obj
+from tests.scene.tube import AMPLITUDE, LENGTH, RADIUS, write_example, write_glb, write_obj
 
 CAMERA = {"position": [0.0, -60.0, 200.0], "fov_deg": 12.0, "size": [160, 60]}
 
@@ -116,3 +117,17 @@ def test_rays_meet_what_trimesh_meets_without_embree(tmp_path: Path) -> None:
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     slow = RayMeshIntersector(surface._caster.mesh).intersects_first(np.tile(origin, (400, 1)), rays)
     assert np.mean(slow == surface.first_hits(origin, rays)) > 0.99
+
+
+def test_the_mesh_of_the_example_is_the_generated_one(tmp_path: Path) -> None:
+    """After a change of the tube: .venv/bin/python -m tests.scene.tube."""
+    committed, made = (
+        [line.split() for line in path.read_text(encoding="ascii").splitlines() if line.startswith(("v", "f"))]
+        for path in (REPOSITORY / "configs" / "tube.obj", write_example(tmp_path / "tube.obj"))
+    )
+    assert [line[0] for line in committed] == [line[0] for line in made]
+    for one, two in zip(committed, made, strict=True):
+        if one[0] == "f":
+            assert one == two
+        else:
+            np.testing.assert_allclose(np.array(one[1:], float), np.array(two[1:], float), atol=1e-2)

@@ -95,6 +95,15 @@ def test_flank_pairs_are_those_that_the_scene_sees() -> None:
         np.testing.assert_allclose(np.hypot(uvw[:, 0], uvw[:, 1]), 0.02, rtol=1e-9)
 
 
+@pytest.mark.parametrize("keys", [FLAT[2], {"lights": [{"kind": "range", "theta_deg": [0, 60]}]}])
+def test_lights_of_some_extent_have_border_pairs_all_around(keys: dict[str, Any]) -> None:
+    made = scene(**keys)
+    uvw = geometry.uvw(*border_pairs(made, 400, 4))
+    assert len(uvw) >= 250
+    assert np.hypot(uvw[:, 0], uvw[:, 1]).min() > rho_max(made) - 0.2
+    assert np.ptp(np.histogram(np.arctan2(uvw[:, 1], uvw[:, 0]), 8)[0]) < 60
+
+
 def test_border_pairs_lie_at_the_edge_of_what_is_visited() -> None:
     """Under one light the border is that of the disc of views about -wi; the whole hemisphere has none."""
     made = scene(**FLAT[0])

@@ -1,4 +1,7 @@
-"""A snake-like tube, generated: circles along a sine, whose texture coordinate u and tangents run along its axis."""
+"""A snake-like tube, generated: circles along a sine, whose texture coordinate u and tangents run along its axis.
+
+`.venv/bin/python -m tests.scene.tube` writes configs/tube.obj, a coarse one.
+"""
 
 import json
 import struct
@@ -34,12 +37,12 @@ def tube(along: int = 160, around: int = 48) -> tuple[Array, np.ndarray, Array, 
     return axis + RADIUS * normals, faces, normals, tangent, np.stack([u, v], axis=1)
 
 
-def write_obj(path: Path, textured: bool = True) -> Path:
+def write_obj(path: Path, textured: bool = True, along: int = 160, around: int = 48, digits: int = 9) -> Path:
     """Writes the tube as an OBJ, with or without texture coordinates."""
-    vertices, faces, normals, _, uv = tube()
-    lines = ["v {:.9g} {:.9g} {:.9g}".format(*row) for row in vertices]
-    lines += ["vn {:.9g} {:.9g} {:.9g}".format(*row) for row in normals]
-    lines += ["vt {:.9g} {:.9g}".format(*row) for row in uv] if textured else []
+    vertices, faces, normals, _, uv = tube(along, around)
+    kinds = {"v": vertices, "vn": normals, **({"vt": uv} if textured else {})}
+    lines = ["# generated, no snake: by tests/scene/tube.py of diffract-bake"]
+    lines += [" ".join([kind, *(f"{x:.{digits}g}" for x in row)]) for kind, rows in kinds.items() for row in rows]
     corner = "{0}/{0}/{0}" if textured else "{0}//{0}"
     lines += ["f " + " ".join(corner.format(i + 1) for i in face) for face in faces]
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
@@ -82,3 +85,12 @@ def write_glb(path: Path, *attributes: str) -> Path:
     chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
     path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
     return path
+
+
+def write_example(path: Path) -> Path:
+    """Writes the tube of configs/tube.toml."""
+    return write_obj(path, along=28, around=14, digits=4)
+
+
+if __name__ == "__main__":
+    write_example(Path("configs/tube.obj"))

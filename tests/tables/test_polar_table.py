@@ -85,7 +85,7 @@ def test_a_smooth_function_is_interpolated_everywhere_and_at_the_origin(azimuths
         np.testing.assert_allclose(found[:, 2], 0.7 * expected, atol=tolerance)
 
 
-def test_look_ups_are_nan_beyond_the_last_ring_only() -> None:
+def test_look_ups_are_nan_beyond_the_largest_rho_only() -> None:
     table = table_of(lambda u, v: 1.0 + 0.0 * u * v, Azimuths(32), Rings(20, 0.1, 1.5))
     inside, outside = table.look_up(directions(np.array([1.5, 1.51]), np.zeros(2), 0.5))
     np.testing.assert_allclose(inside, [1.0, 2.0, 0.5], rtol=1e-5)

@@ -20,6 +20,7 @@ from pipeline.bundle.layout import (
     TableImage,
 )
 from pipeline.bundle.polar.atlas import ABSENT
+from pipeline.diffraction.polar_grid import RHO_MAX
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS
 from pipeline.optics.colour import ColourError
 from pipeline.scene.model import Scene
@@ -29,6 +30,7 @@ Length = Annotated[float, Field(ge=1e-9, le=1e9)]
 Coefficient = Annotated[float, Field(ge=-1e30, le=1e30)]
 _MOST_TERMS = 1024
 _MOST_LOG_ENVELOPE = 230.0
+_ROUNDED = 1e-9
 
 
 class PolarImage(TableImage):
@@ -66,8 +68,8 @@ class PolarGridEntry(GridEntry):
     envelope_exponent: Finite
     basis: list[list[list[Coefficient]]] | None
     ring: str = (
-        "ring i is rho = r0 sinh(i step), rho = sqrt(u^2 + v^2), step = asinh(rho_max / r0) / (rings - 1); so "
-        "i = asinh(rho / r0) / step"
+        "ring i is rho = r0 sinh(i step), rho = sqrt(u^2 + v^2), so i = asinh(rho / r0) / step; the last lies "
+        "beyond rho_max, which is the largest rho that is looked up, or at 2"
     )
     azimuth: str = (
         "azimuth j has atan2(v', stretch u') = 2 pi j / azimuths, (u', v') = (u, v) turned by -axis_rad: "
@@ -100,13 +102,14 @@ class PolarGridEntry(GridEntry):
 
     @model_validator(mode="after")
     def is_a_grid(self) -> Self:
-        """Checks that the step leads to the last ring, that tiles fit the images, and the envelope a double.
+        """Checks that the last ring lies at rho_max or beyond, that tiles fit the images, and the envelope a double.
 
         Raises ValueError, which pydantic reports.
         """
-        expected = math.asinh(self.rho_max / self.r0) / (self.rings - 1)
-        if not math.isclose(self.step, expected, rel_tol=1e-9):
-            raise ValueError(f"step is {self.step:g}, but r0, rho_max and rings give {expected:g}")
+        last = (math.asinh(rho / self.r0) / (self.rings - 1) for rho in (self.rho_max, RHO_MAX))
+        least, most = last
+        if not least * (1.0 - _ROUNDED) <= self.step <= most * (1.0 + _ROUNDED):
+            raise ValueError(f"step is {self.step:g}, but r0, rho_max and rings allow {least:g} to {most:g}")
         self._check_tiles()
         if abs(self.envelope_exponent) * math.log1p((2.0 / self.envelope_radius) ** 2) > _MOST_LOG_ENVELOPE:
             raise ValueError("envelope_radius and envelope_exponent give an envelope beyond 1e100 or below 1e-100")
@@ -128,7 +131,7 @@ class PolarGridEntry(GridEntry):
                 raise ValueError(f"starts[{band}][{sector}] is {start}, which leaves the images")
 
     def contradictions(self, images: int, scene: Scene | None) -> list[str]:
-        """Compares the basis with the outputs that the images hold, and the last ring with the scene."""
+        """Compares the basis with the outputs that the images hold, and rho_max with the scene."""
         from pipeline.scene.visited import rho_max
 
         found: list[str] = []

@@ -98,7 +98,7 @@ def modes_of(setting: Setting) -> Modes:
     """Return the terms that the budget needs, low-passed, over the window as far as its cut."""
     field, sigma_um, sigmas = setting.field, setting.bake.sigma_um, reach_sigmas(setting.bake.tolerance)
     # the fewest samples of one period that carry every frequency that a view reaches under the window
-    edge = setting.plan.rings.rho_max / (1e-3 * setting.bake.lambda_min_nm) + sigmas * sigma_f(sigma_um)
+    edge = setting.plan.rings.last / (1e-3 * setting.bake.lambda_min_nm) + sigmas * sigma_f(sigma_um)
     fewest = (int(fft.next_fast_len(ceil(2.0 * edge * size_um), real=True)) for size_um in field.size_um)
     mx, my = (min(n, few) for n, few in zip(field.shape[::-1], fewest, strict=True))
     spacing_um = field.size_um[0] / mx, field.size_um[1] / my

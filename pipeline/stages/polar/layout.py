@@ -113,5 +113,6 @@ LAYOUT = Layout(
     settings=_settings,
     stored=_stored,
     prepare=_prepare,
+    tiles_of=table.tiles_of,
     at_wavelengths=_at_wavelengths,
 )

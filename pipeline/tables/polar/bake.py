@@ -7,7 +7,7 @@ from kernels.spectral_operator import RingQuadratures
 from pipeline.arrays import Array
 from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
-from pipeline.diffraction.polar_grid import Azimuths, Rings
+from pipeline.diffraction.polar_grid import Azimuths, Rings, last_ring
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics.brdf import Radiometry
 from pipeline.progress import Progress, silent
@@ -25,7 +25,7 @@ class PolarBake:
 
     radiometry: light, material and coherence window of the tables.
     lambda_min_nm: shortest wavelength for which E is computed, nm.
-    rho_max: |(u, v)| of the outermost ring, dimensionless.
+    rho_max: largest |(u, v)| that is looked up, dimensionless.
     spacing: distance of the radii of E, in widths sigma_f of the window's transform.
     terms: number of Chebyshev terms of the stack.
     tolerance: amplitude, relative to its peak, at which the window's transform is cut.
@@ -46,7 +46,8 @@ class PolarBake:
     @cached_property
     def radius_per_um(self) -> Array:
         """Radii of E (n_r,), 1/um, ascending from 0."""
-        return power_spectrum.radii(self.sigma_um, self.rho_max / (1e-3 * self.lambda_min_nm), self.spacing)
+        reach_per_um = last_ring(self.rho_max) / (1e-3 * self.lambda_min_nm)
+        return power_spectrum.radii(self.sigma_um, reach_per_um, self.spacing)
 
     @property
     def sigma_um(self) -> float:

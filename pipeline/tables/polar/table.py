@@ -26,7 +26,7 @@ from pipeline.tables.polar.spectral_integral import Integrand
 
 # at the rim both |w| and w_max vanish: the divisor must exceed the rounding of 4 - rho^2 in the float32 of shaders
 _LEAST_W_MAX = 1e-3
-# rounding, in float32 as well, may place a direction on the rim beyond the last ring
+# rounding, in float32 as well, may place a direction on the rim beyond it
 _RIM = 1.0 + 1e-6
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.diffraction.polar_grid import TILE, Azimuths, Rings
+from pipeline.diffraction.polar_grid import BEYOND, TILE, Azimuths, Rings, last_ring
 from pipeline.diffraction.power_spectrum import PolarPowerSpectrum
 from pipeline.optics import geometry
 from pipeline.optics.coherence import FLANK_DELTA_E, FLANK_RU, FLANK_WIDTHS, lobe_width
@@ -55,7 +55,7 @@ class FlankProbes:
         bake = trial.bake
         self._trial = trial
         reach = min(FLANK_WIDTHS * lobe_width(bake.radiometry.light.middle_nm, bake.sigma_um), bake.rho_max)
-        self._end = min(_MARGIN * reach, bake.rho_max)
+        self._end = min(_MARGIN * reach, last_ring(bake.rho_max))
         half, _ = trial.scattering.probing_angles(_ANGLES, np.random.default_rng(_SEED))
         angles = np.concatenate([half, half + np.pi])
         rho = reach * (np.arange(_RADII) + 0.5) / _RADII
@@ -82,7 +82,7 @@ class FlankProbes:
             return 0.0
         inner = replace(bake, rho_max=self._end)
         last = ceil(asinh(self._end / rings.r0) / rings.step)
-        near = Rings(last + 1, rings.r0, rings.r0 * sinh(last * rings.step))
+        near = Rings(last + 1, rings.r0, rings.r0 * sinh(last * rings.step) / BEYOND)
         if inner.s_nodes not in self._power:
             self._power[inner.s_nodes] = inner.power_spectrum(self._trial.stack, Azimuths(_AZIMUTHS))
         table = inner.table(self._power[inner.s_nodes], near, inner.rules(near.rho()))

@@ -5,7 +5,7 @@ from math import asinh, ceil, floor, sqrt
 import numpy as np
 
 from pipeline import resources
-from pipeline.diffraction.polar_grid import Rings
+from pipeline.diffraction.polar_grid import Rings, last_ring
 from pipeline.diffraction.tiles import AZIMUTHS
 from pipeline.optics.coherence import lobe_width
 from pipeline.tables.polar.bake import PolarBake
@@ -31,7 +31,7 @@ class Grids:
         distance: of the innermost rings at most, in widths of the specular lobe at the shortest wavelength.
         """
         self._bake, self._layout, self._delta_e = bake, layout, delta_e
-        self._rho_max, self._is_line = bake.rho_max, bake.radiometry.light.is_line
+        self._last, self._is_line = last_ring(bake.rho_max), bake.radiometry.light.is_line
         self._distance = distance * lobe_width(bake.lambda_min_nm, bake.sigma_um)
 
     def first(self) -> tuple[int, int]:
@@ -40,9 +40,9 @@ class Grids:
         window = self._bake.sigma_um / _BASE_SIGMA_UM
         step = _BASE_RING_STEP / finer
         if self._is_line:
-            x = asinh(self._rho_max / self._widest_r0)
+            x = asinh(self._last / self._widest_r0)
             step = 0.5 * x / (self._bake.radius_per_um[-1] * 2.0 * np.pi * self._bake.sigma_um) / finer
-        x = asinh(self._rho_max / self._r0_at(step))
+        x = asinh(self._last / self._r0_at(step))
         rings = int(np.clip(x / step, self._least_rings, _MOST_RINGS))
         azimuths = int(np.clip(_BASE_AZIMUTHS * window * finer, _LEAST_AZIMUTHS, _MOST_AZIMUTHS))
         layout = self._layout
@@ -54,7 +54,7 @@ class Grids:
     @property
     def _widest_r0(self) -> float:
         """The largest radius below which rings are even: about the specular lobe, or all for a laser line."""
-        widest = 4.0 * self._rho_max
+        widest = 4.0 * self._last
         return widest if self._is_line else min(_BASE_R0 * _BASE_SIGMA_UM / self._bake.sigma_um, widest)
 
     def _r0(self, count: int) -> float:
@@ -74,13 +74,13 @@ class Grids:
 
     def _span(self, r0: float) -> float:
         """Computes the distance of the innermost rings times the number of distances."""
-        return r0 * asinh(self._rho_max / r0)
+        return r0 * asinh(self._last / r0)
 
     @property
     def _least_rings(self) -> int:
         """Least number of rings, whatever the budget: the step that puts even rings one width of the lobe apart."""
         step = lobe_width(self._bake.lambda_min_nm, self._bake.sigma_um) / self._widest_r0
-        return max(_LEAST_RINGS, ceil(asinh(self._rho_max / self._r0_at(step)) / step))
+        return max(_LEAST_RINGS, ceil(asinh(self._last / self._r0_at(step)) / step))
 
     def _r0_at(self, step: float) -> float:
         """Chooses the radius below which rings are evenly spaced, for a step of arsinh(rho / r0)."""
@@ -90,11 +90,11 @@ class Grids:
     def innermost(self) -> Rings:
         """Places the rings of the first grid as far apart at the mirror direction as the search may."""
         r0 = self._r0(self.first()[0])
-        return Rings(max(floor(self._span(r0) / self._distance) + 1, _LEAST_RINGS), r0, self._rho_max)
+        return Rings(max(floor(self._span(r0) / self._distance) + 1, _LEAST_RINGS), r0, self._bake.rho_max)
 
     def rings(self, count: int) -> Rings:
         """Places so many rings."""
-        return Rings(count, self._r0(count), self._rho_max)
+        return Rings(count, self._r0(count), self._bake.rho_max)
 
     def clipped(self, rings: float, azimuths: float) -> tuple[int, int]:
         """Rounds and limits numbers of rings and azimuths, and replaces those that the layout sets."""
