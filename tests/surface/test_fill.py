@@ -104,6 +104,7 @@ def test_cost_is_linear_in_samples(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["block", "blobs", "0.4"])
 def test_a_scan_of_2048_lines(kind: str) -> None:
     seconds, peak = _cost(2048, kind)
-    assert seconds < 5.0
+    # 2 to 6 s on the processors of two servers
+    assert seconds < 10.0
     # the scan itself takes 34 MB
     assert peak < 0.5e9
