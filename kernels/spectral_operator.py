@@ -36,7 +36,7 @@ class RingQuadratures:
 
 
 class GroupKey(NamedTuple):
-    """What tells whether the groups of two lights have the same points: their rings, kind, kappa and span in |w|."""
+    """The properties of a group that two lights with the same points share: rings, kind, kappa and span in |w|."""
 
     ring: int
     rings: int

@@ -20,8 +20,7 @@ from pipeline.arrays import Array
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
 from pipeline.optics.colour import pixels
 from pipeline.scene.model import Scene
-from pipeline.scene.summary import CELLS, SAMPLES
-from pipeline.scene.visited import rho_max, visited
+from pipeline.scene.visited import CELLS, SAMPLES, rho_max, visited
 from pipeline.surface.heightfield import HeightField
 
 _DPI = 110

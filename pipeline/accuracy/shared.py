@@ -1,6 +1,7 @@
 """An exact reference that several configs ask, which differ in light or material but not in |P|^2."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from hashlib import sha256
 
 import numpy as np
@@ -10,8 +11,6 @@ from pipeline.diffraction.reference import STEP_NM, Reference
 from pipeline.optics.light import Light
 from pipeline.optics.material import Material
 from pipeline.progress import Progress, silent
-from pipeline.surface.heightfield import HeightField
-from pipeline.surface.windows import MIDDLE, Places
 
 Seen = tuple[Light, Material]
 # of the answers that are kept for other configs: those on a map's 71 k views take 1.7 MB for each
@@ -27,20 +26,16 @@ class SharedReference(Reference):
     following: lights and materials that will be asked for.
     """
 
-    def __init__(
-        self,
-        field: HeightField,
-        sigma_um: float,
-        lambda_min_nm: float,
-        progress: Progress = silent,
-        places: Places = MIDDLE,
-    ) -> None:
-        """Makes the reference; parameters and errors are those of `Reference`."""
-        super().__init__(field, sigma_um, lambda_min_nm, progress, places)
-        self.following: Sequence[Seen] = ()
-        self._kept: dict[str, Array] = {}
+    following: Sequence[Seen] = ()
+
+    @cached_property
+    def _kept(self) -> dict[str, Array]:
+        return {}
+
+    @cached_property
+    def _single(self) -> dict[str, Array]:
         # |P|^2 of a few directions, by which the reference itself is checked
-        self._single: dict[str, Array] = {}
+        return {}
 
     @property
     def nbytes(self) -> int:

@@ -16,8 +16,8 @@ from math import asinh, pi
 import numpy as np
 
 from pipeline.arrays import Array
+from pipeline.optics.geometry import RHO_MAX
 
-RHO_MAX = 2.0  # |(u, v)| of grazing light and a view in the same direction
 # how far rings go on beyond what is looked up. The spline is mirrored at the last ring, an error that falls by 0.27
 # from ring to ring. Mean dE at 7500 RU on the border of scenes, under the sun at 30 degrees with views to 40, and
 # under a normal light with views to 15: 0.24 and 0.19 at 1, 0.044 and 0.079 at 1.08, 0.040 and 0.029 at 1.15

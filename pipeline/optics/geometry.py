@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike
 
 from pipeline.arrays import Array
 
+RHO_MAX = 2.0  # |(u, v)| of grazing light and a view in the same direction
+
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> Array:
     """Converts polar angles `theta` and azimuths `phi`, radians, which broadcast, to unit vectors (..., 3)."""

@@ -1,1 +1,1 @@
-"""What will be looked at: lights, views, cameras and meshes, as pairs of directions in the sample's own frame."""
+"""Lights, views, cameras and meshes of a scene, as pairs of directions in the sample's own frame."""

@@ -19,7 +19,8 @@ from pipeline.scene.patches import SphericalPatch, cap
 MOST_PIXELS = 4096 * 2048
 # luminance of linear sRGB, ITU-R BT.709
 _LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}
-# a bright direction: pixels that touch, each with so many times the mean radiance; at most so many are kept apart
+# a bright direction is a group of adjacent pixels, each of at least _BRIGHT times the mean radiance; a map has at
+# most _MOST_BRIGHT of them
 _BRIGHT, _MOST_BRIGHT = 16.0, 32
 
 

@@ -28,7 +28,7 @@ class Direction(Validated):
     phi_deg: Azimuth = 0.0
 
     def same_as(self, other: "Direction") -> bool:
-        """Whether both are one direction; whole turns, and the azimuth of the normal, make no difference."""
+        """Says whether both are one direction; whole turns, and the azimuth of the normal, make no difference."""
         turned = 0.0 if self.theta_deg == 0 else (self.phi_deg - other.phi_deg + 180.0) % 360.0 - 180.0
         return abs(self.theta_deg - other.theta_deg) < _SAME_DEG and abs(turned) < _SAME_DEG
 
@@ -253,5 +253,6 @@ SceneLight = Annotated[
         custom_error_message=f"expected a kind, one of {', '.join(KINDS)}",
     ),
 ]
-SceneLights = Annotated[list[SceneLight], Field(min_length=1, max_length=256)]
+MOST_LIGHTS = 256
+SceneLights = Annotated[list[SceneLight], Field(min_length=1, max_length=MOST_LIGHTS)]
 Lights = Annotated[list[Direction], Field(min_length=1)]

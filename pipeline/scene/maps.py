@@ -4,12 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.scene.lights import Direction, Parallel, SceneLight
-from pipeline.scene.model import Scene, Views
+from pipeline.scene.lights import MOST_LIGHTS, Direction, Parallel, SceneLight
+from pipeline.scene.model import LEAST_DEG, Scene, Views
 from pipeline.scene.visited import rho_max
-
-# the least cone of views, and the most lights, that a scene may have
-_LEAST_DEG, _MOST_LIGHTS = 0.1, 256
 
 
 def map_radius(scene: Scene | None, light: Direction) -> float:
@@ -31,12 +28,12 @@ def map_scenes(scene: Scene, lights: Sequence[Direction]) -> list[Scene]:
         towards = Parallel(theta_deg=light.theta_deg, phi_deg=light.phi_deg)
         by_radius.setdefault(map_radius(scene, light), []).append(towards)
     return [
-        Scene(lights=parallel[first : first + _MOST_LIGHTS], views=_views(radius))
+        Scene(lights=parallel[first : first + MOST_LIGHTS], views=_views(radius))
         for radius, parallel in by_radius.items()
-        for first in range(0, len(parallel), _MOST_LIGHTS)
+        for first in range(0, len(parallel), MOST_LIGHTS)
     ]
 
 
 def _views(radius: float) -> Views:
     widest = float(np.degrees(np.arcsin(max(radius, 0.0))))
-    return Views(theta_max_deg=max(widest, _LEAST_DEG))
+    return Views(theta_max_deg=max(widest, LEAST_DEG))

@@ -12,6 +12,8 @@ from pipeline.validated import Pair, Positive, Validated, existing_file
 
 # errors are not measured closer to the horizon, where G grows like 1 / cos
 WIDEST_DEG = 88.0
+# the least range of polar angles of views
+LEAST_DEG = 0.1
 
 
 class Views(Validated):
@@ -21,7 +23,7 @@ class Views(Validated):
     """
 
     theta_min_deg: Annotated[float, Field(ge=0, lt=WIDEST_DEG)] = 0.0
-    theta_max_deg: Annotated[float, Field(ge=0.1, le=90)] = 90.0
+    theta_max_deg: Annotated[float, Field(ge=LEAST_DEG, le=90)] = 90.0
     phi_deg: Pair = (0.0, 360.0)
 
     @field_validator("phi_deg")
@@ -32,9 +34,9 @@ class Views(Validated):
     @model_validator(mode="after")
     def has_views(self) -> Self:
         """Refuses an empty range."""
-        if self.theta_max_deg < self.theta_min_deg + 0.1:
+        if self.theta_max_deg < self.theta_min_deg + LEAST_DEG:
             raise ValueError(
-                f"expected theta_max_deg at least 0.1 above theta_min_deg, got {self.theta_max_deg:g} "
+                f"expected theta_max_deg at least {LEAST_DEG:g} above theta_min_deg, got {self.theta_max_deg:g} "
                 f"and {self.theta_min_deg:g}"
             )
         return self

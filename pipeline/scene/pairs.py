@@ -13,16 +13,12 @@ from pipeline.arrays import Array
 from pipeline.optics import geometry
 from pipeline.scene import seen
 from pipeline.scene.model import WIDEST_DEG, Scene
-from pipeline.scene.visited import visited
+from pipeline.scene.visited import CELLS, SAMPLES, cells, visited
 
 # lights that graze more have mirror directions beyond the omitted horizon
 _WIDEST_LIGHT_DEG = 85.0
 # a draw is repeated until enough lights are above the horizon of what the pixels see
 _MOST_DRAWS = 64
-# the set of directions in which those of a flank are looked for
-_VISITED = 200_000
-# cells of (u, v) along its range of 4, in which the border of the visited directions is found
-_BORDER_CELLS = 128
 # pairs drawn for each that is wanted on the border; gaps between cells that are closed
 _BORDER_DRAWS, _CLOSED = 250, 5
 
@@ -52,7 +48,7 @@ def border_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Arr
     from scipy import ndimage
 
     wi, wr = random_pairs(scene, _BORDER_DRAWS * count, seed)
-    cell, met = _cell(geometry.uvw(wi, wr)), np.zeros((_BORDER_CELLS, _BORDER_CELLS), bool)
+    cell, met = tuple(cells(geometry.uvw(wi, wr)).T), np.zeros((CELLS, CELLS), bool)
     met[cell] = True
     # cells that none of the pairs meets by chance are no border
     met = ndimage.binary_closing(met, np.ones((_CLOSED, _CLOSED)))
@@ -60,12 +56,6 @@ def border_pairs(scene: Scene | None, count: int, seed: int) -> tuple[Array, Arr
     inner = ndimage.binary_erosion(met, np.ones((3, 3)), border_value=1)
     outermost = np.flatnonzero(~inner[cell])[:count]
     return wi[outermost], wr[outermost]
-
-
-def _cell(uvw: Array) -> tuple[np.ndarray, np.ndarray]:
-    index = np.floor((uvw[:, :2] + 2.0) * (_BORDER_CELLS / 4.0)).astype(int)
-    index = np.clip(index, 0, _BORDER_CELLS - 1)
-    return index[:, 1], index[:, 0]
 
 
 def flank_pairs(scene: Scene | None, rho: Array, phi: Array, seed: int) -> tuple[Array, Array]:
@@ -101,7 +91,7 @@ def _nearest_lights(scene: Scene, uv: Array) -> Array:
     """Finds the lights (count, 3) of the visited directions within whose gap each (u, v) lies; NaN where none is."""
     from scipy.spatial import cKDTree
 
-    found = visited(scene, _VISITED)
+    found = visited(scene, SAMPLES)
     near = np.hypot(found.uvw[:, 0], found.uvw[:, 1]) <= np.linalg.norm(uv, axis=1).max() + found.gap
     if not near.any():
         return np.full((len(uv), 3), np.nan)

@@ -7,11 +7,7 @@ import numpy as np
 from pipeline.scene import seen
 from pipeline.scene.lights import Environment
 from pipeline.scene.model import Scene
-from pipeline.scene.visited import rho_max, visited
-
-SAMPLES = 200_000
-# cells along the range of u and v, -2 to 2, whose share is stated
-CELLS = 128
+from pipeline.scene.visited import CELLS, SAMPLES, cells, rho_max, visited
 
 
 def summary(scene: Scene) -> dict[str, Any]:
@@ -22,14 +18,13 @@ def summary(scene: Scene) -> dict[str, Any]:
     each camera the share of its pixels that meet the sample and the solid angle of the middle pixel, sr.
     """
     found = visited(scene, SAMPLES)
-    cells = np.floor((found.uvw[:, :2] + 2.0) * (CELLS / 4.0)).astype(int)
     width = np.abs(found.uvw[:, 2])
     maps = [light.map.bright for light in scene.lights if isinstance(light, Environment)]
     rasters = [] if scene.cameras is None else seen.rasters(scene)
     return {
         "rho_max": rho_max(scene),
         "w": [float(width.min()), float(width.max())],
-        "disc_share": float(len(np.unique(cells, axis=0)) / (np.pi * (CELLS / 2) ** 2)),
+        "disc_share": float(len(np.unique(cells(found.uvw), axis=0)) / (np.pi * (CELLS / 2) ** 2)),
         "samples": len(found.uvw),
         "gap": {"median": float(np.median(found.gap)), "largest": float(found.gap.max())},
         "bright": [{"direction": part.centre.tolist(), "power": part.power} for bright in maps for part in bright],

@@ -6,17 +6,18 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.optics import geometry
+from pipeline.optics.geometry import RHO_MAX
 from pipeline.scene import seen
 from pipeline.scene.model import Scene
 
+# samples of a scene's directions, and cells along the range of u and v, -2 to 2, in which they are counted
+SAMPLES, CELLS = 200_000, 128
 # the finest lattice, rad: half the distance of neighbouring texels of a usual table
 _FINEST = 4e-3
 # samples for the largest |(u, v)|
 _OF_RADIUS = 100_000
 # cells of lights, rad, in bounds of what a flat sample reaches
 _OF_DISCS = 0.1
-# |(u, v)| of grazing light and a view in the same direction
-_RHO_MAX = 2.0
 # a tenth of a degree, as the least of views
 _LEAST_RHO = 1.7e-3
 
@@ -52,18 +53,24 @@ def visited(scene: Scene, count: int) -> Visited:
     return found._replace(weight=found.weight / found.weight.sum())
 
 
+def cells(uvw: Array) -> np.ndarray:
+    """Finds the cells of u and v, two indices from 0 to CELLS - 1, in which directions (n, 3) lie, (n, 2)."""
+    index = np.floor((uvw[:, :2] + RHO_MAX) * (CELLS / (2.0 * RHO_MAX))).astype(int)
+    return np.asarray(np.clip(index, 0, CELLS - 1))
+
+
 def rho_max(scene: Scene | None) -> float:
     """Computes a bound of |(u, v)| in a scene; 2 without one.
 
     On a flat sample it is the largest sin(theta_i) + sin(theta_r), under cameras that of the visited directions.
     """
     if scene is None:
-        return _RHO_MAX
+        return RHO_MAX
     if scene.cameras is not None:
         found = visited(scene, _OF_RADIUS)
-        return float(np.clip(np.max(np.hypot(found.uvw[:, 0], found.uvw[:, 1]) + found.gap), _LEAST_RHO, _RHO_MAX))
+        return float(np.clip(np.max(np.hypot(found.uvw[:, 0], found.uvw[:, 1]) + found.gap), _LEAST_RHO, RHO_MAX))
     view = np.sin(np.radians(scene.views.theta_max_deg))
-    return float(min(_RHO_MAX, max(light.largest_sine for light in scene.lights) + view))
+    return float(min(RHO_MAX, max(light.largest_sine for light in scene.lights) + view))
 
 
 def discs(scene: Scene | None) -> list[tuple[tuple[float, float], float]]:
@@ -121,7 +128,7 @@ def _of_raster(raster: seen.Raster, light: Array, power: float, gap: float) -> V
         np.maximum.at(gaps, one, apart)
         np.maximum.at(gaps, two, apart)
     # a pixel whose neighbours are on other sheets is as wide as the pixels are on average
-    gaps = np.where(gaps > 0.0, gaps, np.mean(gaps[gaps > 0.0]) if gaps.any() else _RHO_MAX) + gap
+    gaps = np.where(gaps > 0.0, gaps, np.mean(gaps[gaps > 0.0]) if gaps.any() else RHO_MAX) + gap
     # NaN, of what is not met, is not above
     above = wi[:, 2] > 0.0
     return Visited(uvw[above], power * raster.weight[above], gaps[above], wi[above])

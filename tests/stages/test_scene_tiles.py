@@ -84,10 +84,10 @@ def test_a_damaged_tile_is_baked_again(store: Store) -> None:
 
 def test_savings_are_shares_of_the_full_bake(store: Store) -> None:
     found, _, chosen = full()
-    shelf = scene_tiles.shelf(found, field_of(found), "s", chosen, ONE.centre)
+    stored = scene_tiles.stored_tiles(found, field_of(found), "s", chosen, ONE.centre)
     tiles = table_of(store, [ONE]).tables[0].tiles
-    saved = shelf.savings(tiles)
+    saved = stored.savings(tiles)
     assert saved.texels == pytest.approx(1.0 - tiles.texels / thinned(tiles.grid).texels)
-    assert saved.values == pytest.approx(1.0 - 1.0 / shelf.tile.bake.w_terms)
+    assert saved.values == pytest.approx(1.0 - 1.0 / stored.tile.bake.w_terms)
     assert all(0.0 <= share < 1.0 for share in vars(saved).values())
     assert saved.frequencies > 0.3

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
 from pipeline.tables.polar.knots import inserted, removed
 
-# any device has textures of so many columns and rows; the natural picture may be wider
+# columns of the textures that any device has; a table without gaps keeps one column for each azimuth and may be wider
 _MOST_WIDTH = 4096
 ABSENT = -1
 

@@ -20,9 +20,9 @@ from pipeline.bundle.layout import (
     TableImage,
 )
 from pipeline.bundle.polar.atlas import ABSENT
-from pipeline.diffraction.polar_grid import RHO_MAX
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS
 from pipeline.optics.colour import ColourError
+from pipeline.optics.geometry import RHO_MAX
 from pipeline.scene.model import Scene
 from pipeline.validated import Finite, Validated
 

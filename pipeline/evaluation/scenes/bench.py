@@ -29,7 +29,7 @@ from pipeline.scene.lights import Parallel
 from pipeline.scene.model import Scene, Views
 from pipeline.scene.pairs import random_pairs
 from pipeline.stages.polar import power_spectrum, scene_tiles
-from pipeline.stages.polar.scene_tiles import Savings, Shelf
+from pipeline.stages.polar.scene_tiles import Savings, StoredTiles
 from pipeline.stages.surface import field_of
 from pipeline.store import digest, scratch
 from pipeline.store.store import Store
@@ -127,8 +127,8 @@ class _Bench:
         """Return the bytes of the full table as tiles have them: without knots that thinned rings do not have."""
         return 4 * 3 * self.full.w_terms * self.full.tiles.texels
 
-    def shelf(self, wi: Array) -> Shelf:
-        return scene_tiles.shelf(self.config, self.field, self._surface, self.plan, wi)
+    def stored_tiles(self, wi: Array) -> StoredTiles:
+        return scene_tiles.stored_tiles(self.config, self.field, self._surface, self.plan, wi)
 
     def errors(self, table: Table, wi: Array, wr: Array, exact: Array) -> Array:
         """Return the CIELAB differences of a table from XYZ (directions, 3) at the exposure of all errors here."""
@@ -170,10 +170,10 @@ def _surface(config: Config, progress: Progress) -> SceneCosts:
     white, laser = _Bench(config, field, config.light), _Bench(config, field, _LASER)
     normal, (wi, wr) = Scene(lights=[_NORMAL]), _screen()
     of_normal, of_screen = reach(normal, white.full.grid), of_directions(laser.full.grid, geometry.uvw(wi, wr))
-    shelves = {_ON_NORMAL: white.shelf(_NORMAL.centre), _ON_SCREEN: laser.shelf(LIGHT.vector)}
+    stored = {_ON_NORMAL: white.stored_tiles(_NORMAL.centre), _ON_SCREEN: laser.stored_tiles(LIGHT.vector)}
     tiles = {_ON_NORMAL: of_normal.tiles(), _ON_SCREEN: of_screen.tiles()}
     works: dict[str, Callable[[], Any]] = {"full": white.bake_full, "laser, full": laser.bake_full}
-    works |= {name: partial(shelf.bake, tiles[name].covered) for name, shelf in shelves.items()}
+    works |= {name: partial(each.bake, tiles[name].covered) for name, each in stored.items()}
     seconds = _kernel_seconds(works)
     costs = {
         name: TableCost(seconds[name], bench.full_bytes, *2 * (tiles[of].covered.size,))
@@ -189,10 +189,10 @@ def _surface(config: Config, progress: Progress) -> SceneCosts:
             (_ON_NORMAL, "normal", white, random_pairs(normal, _DIRECTIONS, _SEED)),
             (_ON_SCREEN, "laser", laser, _random(wi, wr)),
         ):
-            found = scene_tiles.table(store, shelves[name], tiles[name]).table
+            found = scene_tiles.table(store, stored[name], tiles[name]).table
             covered = tiles[name].covered
             costs[name] = TableCost(
-                seconds[name], found.nbytes, int(covered.sum()), covered.size, shelves[name].savings(tiles[name])
+                seconds[name], found.nbytes, int(covered.sum()), covered.size, stored[name].savings(tiles[name])
             )
             _check_light(check, key, bench, found, costs[name], costs["full"], pairs, progress)
         _check_reuse(check, white, store)
@@ -241,13 +241,13 @@ def _check_reuse(check: Callable[..., None], bench: _Bench, store: Store) -> Non
     """Check which tiles are baked when a scene changes."""
     narrow = Scene(lights=[_SECOND], views=Views(theta_max_deg=20.0))
     wide, grid = Scene(lights=[_SECOND], views=Views(theta_max_deg=40.0)), bench.full.grid
-    first = scene_tiles.table(store, bench.shelf(_NORMAL.centre), reach(Scene(lights=[_NORMAL]), grid).tiles())
+    first = scene_tiles.table(store, bench.stored_tiles(_NORMAL.centre), reach(Scene(lights=[_NORMAL]), grid).tiles())
     tiles = reach(narrow, grid).tiles()
-    second = scene_tiles.table(store, bench.shelf(_SECOND.centre), tiles)
+    second = scene_tiles.table(store, bench.stored_tiles(_SECOND.centre), tiles)
     check("first_light_again", first.baked, f"the second light's own: {second.baked}")
     wider = reach(wide, grid).tiles()
-    added = scene_tiles.table(store, bench.shelf(_SECOND.centre), wider)
+    added = scene_tiles.table(store, bench.stored_tiles(_SECOND.centre), wider)
     new = int(np.sum(wider.covered & ~tiles.covered))
     check("wider_views", added.baked - new, f"{added.baked} baked, {int(wider.covered.sum())} covered")
-    back = scene_tiles.table(store, bench.shelf(_SECOND.centre), tiles)
+    back = scene_tiles.table(store, bench.stored_tiles(_SECOND.centre), tiles)
     check("changed_back", back.baked, f"{int(tiles.covered.sum())} covered")

@@ -47,7 +47,7 @@ class Savings:
 
 
 @dataclass(frozen=True)
-class Shelf:
+class StoredTiles:
     """The tiles of a surface under one light, or of polynomials in |w| for all lights.
 
     key: their address in the store. tile: the bake. field: the surface. places: positions of the coherence window.
@@ -134,12 +134,12 @@ def scene_table(store: Store, config: Config, field: HeightField, surface_key: s
     without a scene. Raises the errors of `table`.
     """
 
-    def on_shelf(wi: Array | None) -> Shelf:
-        return shelf(config, field, surface_key, planned, wi)
+    def stored_of(wi: Array | None) -> StoredTiles:
+        return stored_tiles(config, field, surface_key, planned, wi)
 
-    every = on_shelf(None)
+    every = stored_of(None)
     tiles = reach(config.scene, every.tile.grid).tiles()
-    by_light = [(on_shelf(wi), reach(alone, every.tile.grid).tiles()) for wi, alone in _by_light(config.scene)]
+    by_light = [(stored_of(wi), reach(alone, every.tile.grid).tiles()) for wi, alone in _by_light(config.scene)]
     bytes_by_light = sum(each.tile.outputs * its.texels for each, its in by_light)
     if by_light and bytes_by_light < every.tile.outputs * tiles.texels:
         found = [table(store, each, its) for each, its in by_light]
@@ -162,8 +162,10 @@ def _by_light(scene: Scene | None) -> list[tuple[Array, Scene]]:
     return [(light.centre, scene.model_copy(update={"lights": [light]})) for light in above]
 
 
-def shelf(config: Config, field: HeightField, surface_key: str, planned: Plan, wi: Array | None) -> Shelf:
-    """Returns the shelf of a light, or of polynomials in |w| for all lights.
+def stored_tiles(
+    config: Config, field: HeightField, surface_key: str, planned: Plan, wi: Array | None
+) -> StoredTiles:
+    """Returns the stored tiles of a light, or of polynomials in |w| for all lights.
 
     config: its coherence, light, material and budget are read, and no scene. field: the surface, with its address.
     planned: the plan of a table without a scene. wi: unit vector towards the light (3,), None for all lights.
@@ -175,13 +177,13 @@ def shelf(config: Config, field: HeightField, surface_key: str, planned: Plan, w
     )
     tile = TileBake(bake, PolarGrid(planned.rings, planned.azimuths), wi, w_terms)
     key = digest.of_json(_parameters(config, surface_key, planned, wi))
-    return Shelf(key, tile, field, windows.places(field.extent, config.coherence))
+    return StoredTiles(key, tile, field, windows.places(field.extent, config.coherence))
 
 
-def table(store: Store, found: Shelf, tiles: Tiles) -> Found:
+def table(store: Store, found: StoredTiles, tiles: Tiles) -> Found:
     """Makes the table of some tiles.
 
-    store: where tiles are read and written. found: their shelf. tiles: those that the table covers.
+    store: where tiles are read and written. found: their surface, light and bake. tiles: those that the table covers.
     Raises StorageError where tiles cannot be written, DeviceError if no device works.
     """
     folder, places = store.tiles(found.key), [(int(b), int(k)) for b, k in np.argwhere(tiles.covered)]

@@ -13,14 +13,12 @@ from pipeline.arrays import Array
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles, bands, sectors, thinned
 from pipeline.scene.model import Scene
-from pipeline.scene.visited import visited
+from pipeline.scene.visited import SAMPLES, visited
 
 # knots from the texels beside a direction to those of its spline
 _TAPS = 2
 # knots between a look-up and the end of the samples: of the second difference there, 0.268^6 = 4e-4 remains
 MARGIN = 6
-# samples of a scene's directions
-_SAMPLES = 200_000
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def reach(scene: Scene | None, grid: PolarGrid) -> Reach:
     """Finds what a scene visits of a grid; without a scene, all of it. Raises the errors of `visited`."""
     if scene is None:
         return Reach(grid, np.ones((grid.rings.count, grid.azimuths.count), bool))
-    found = visited(scene, _SAMPLES)
+    found = visited(scene, SAMPLES)
     return of_directions(grid, found.uvw, found.gap)
 
 

@@ -69,13 +69,18 @@ class PolarTable:
         return found
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
-        """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3).
+        """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3), as the function of this name."""
+        return direction_factor(radiometry, wi, wr)
 
-        For a metal, whose reflectance at every angle is part of the table, only G and w remain.
-        """
-        if radiometry.material.fresnel == "conductor":
-            return geometry_factor(radiometry.material, wi, wr)
-        return radiometry.direction_factor(wi, wr)
+
+def direction_factor(radiometry: Radiometry, wi: Array, wr: Array) -> Array:
+    """Computes the factor C cos(ti) (directions,) of look-ups for unit vectors wi, wr (directions, 3).
+
+    For a metal, whose reflectance at every angle is part of the table, only G and w remain.
+    """
+    if radiometry.material.fresnel == "conductor":
+        return geometry_factor(radiometry.material, wi, wr)
+    return radiometry.direction_factor(wi, wr)
 
 
 def build(power: PolarPowerSpectrum, rings: Rings, integrands: Sequence[Integrand], w_terms: int) -> list[PolarTable]:

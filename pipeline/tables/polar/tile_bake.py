@@ -22,13 +22,13 @@ from pipeline.diffraction import power_spectrum
 from pipeline.diffraction.dft_stack import Stack
 from pipeline.diffraction.polar_grid import PolarGrid
 from pipeline.diffraction.tiles import AZIMUTHS, RINGS, Tiles
-from pipeline.optics.brdf import Radiometry, geometry_factor
+from pipeline.optics.brdf import Radiometry
 from pipeline.surface.windows import MIDDLE, Places
 from pipeline.tables.polar import line_points
 from pipeline.tables.polar.bake import PolarBake
 from pipeline.tables.polar.reach import known_cells, smooth_w_of, w_of
 from pipeline.tables.polar.spectral_integral import Integrand, on_rings
-from pipeline.tables.polar.table import w_position
+from pipeline.tables.polar.table import direction_factor, w_position
 
 _VECTORS = AZIMUTHS // LANES  # of a sector
 # radii of E beyond those of a band's wavelengths, for Lagrange's polynomials
@@ -237,9 +237,7 @@ class TileTable:
 
     def direction_factor(self, radiometry: Radiometry, wi: Array, wr: Array) -> Array:
         """Computes C cos(ti) (directions,) for unit vectors wi, wr (directions, 3), as a polar table does."""
-        if radiometry.material.fresnel == "conductor":
-            return geometry_factor(radiometry.material, wi, wr)
-        return radiometry.direction_factor(wi, wr)
+        return direction_factor(radiometry, wi, wr)
 
 
 def assemble(samples: Mapping[tuple[int, int], NDArray[np.float32]], tiles: Tiles, bake: TileBake) -> TileTable:
